@@ -1,5 +1,5 @@
 //! Time of a frame in the trackers. Particle tracker: two targets that look alike in 720 x 480. Gradient
-//! tracker: its modes on a 256 x 256 scene with a 13 px target, with a camera that stands still or moves, and
+//! tracker: a 256 x 256 scene with a 13 px target, with a camera that stands still or moves, and
 //! a target of 80 px in 720 x 480.
 //!
 //! One thread. `python -m benchmarks.tables.tracking` times the same beside OpenCV's trackers.
@@ -8,7 +8,7 @@ use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use jacoflow::parallel::Threads;
 use jacoflow::synth::targets::{TargetScene, TargetSceneOptions};
 use jacoflow::track::Tracker;
-use jacoflow::track::gradient::{GradientOptions, GradientTracker, Mode, Start};
+use jacoflow::track::gradient::{GradientOptions, GradientTracker, Start};
 use jacoflow::track::particle::{ParticleMode, ParticleOptions, ParticleTracker};
 use jacoflow::types::{AnyColourFrame, Frame, TargetBox};
 use std::hint::black_box;
@@ -64,17 +64,15 @@ fn track(criterion: &mut Criterion) {
         let frames: Vec<_> = (0..LAP).map(|t| scene.frame(t)).collect();
         let mut group = criterion.benchmark_group(scene.name);
         group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
-        for mode in [Mode::Layered, Mode::Local] {
-            let options = GradientOptions { mode, ..GradientOptions::default() };
-            let mut tracker = GradientTracker::new(&frames[0], scene.start(), &options).expect("a valid start");
-            let mut next = 0;
-            group.bench_function(BenchmarkId::from_parameter(mode.name()), |bencher| {
-                bencher.iter(|| {
-                    next += 1;
-                    black_box(tracker.update(&frames[next % LAP]).expect("frames of one size"))
-                });
+        let options = GradientOptions::default();
+        let mut tracker = GradientTracker::new(&frames[0], scene.start(), &options).expect("a valid start");
+        let mut next = 0;
+        group.bench_function("gradient", |bencher| {
+            bencher.iter(|| {
+                next += 1;
+                black_box(tracker.update(&frames[next % LAP]).expect("frames of one size"))
             });
-        }
+        });
         group.finish();
     }
 }

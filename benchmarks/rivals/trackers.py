@@ -6,6 +6,7 @@ from __future__ import annotations
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ except ImportError:
 Frames = NDArray[np.uint8]
 Box = tuple[float, float, float, float]
 MODES = ("layered", "local", "paper")
-"""Our methods."""
+"""Our tracker, and the two methods of its source: these need a build with the feature `reference`."""
 RIVALS = ("CSRT", "KCF", "MedianFlow", "MIL", "MOSSE")
 """OpenCV's trackers that need no trained network."""
 ENLARGED = ("CSRT", "KCF")
@@ -69,23 +70,34 @@ def everyone() -> list[Tracker]:
 def ours(modes: tuple[str, ...] = MODES, **options: Any) -> Iterator[Tracker]:
     """Our methods; none where jacoflow has no trackers."""
     try:
-        from jacoflow import track
+        from jacoflow import reference, track
     except ImportError:
         return
+    kinds = {"layered": track.GradientTracker}
+    if has_reference():
+        kinds |= {mode: partial(reference.ReferenceTracker, method=mode) for mode in ("local", "paper")}
 
     def runner(mode: str) -> Callable[[Frames, Box], Track]:
-        return lambda frames, box: _run_ours(track.GradientTracker, mode, frames, box, options)
+        return lambda frames, box: _run_ours(kinds[mode], frames, box, options)
 
     for mode in modes:
-        yield Tracker(f"jacoflow {mode}", runner(mode))
+        if mode in kinds:
+            yield Tracker(f"jacoflow {mode}", runner(mode))
 
 
-def _run_ours(kind: Any, mode: str, frames: Frames, box: Box, options: dict[str, Any]) -> Track:
+def has_reference() -> bool:
+    """Whether jacoflow was built with the feature `reference`: the loop of the tracker's source."""
+    from jacoflow import _jacoflow
+
+    return hasattr(_jacoflow, "_reference_tracker")
+
+
+def _run_ours(kind: Any, frames: Frames, box: Box, options: dict[str, Any]) -> Track:
     """One of our trackers through the frames."""
     results: list[Any] = []
 
     def work() -> None:
-        tracker = kind(frames[0], bbox=box, method=mode, **options)
+        tracker = kind(frames[0], bbox=box, **options)
         results.extend(tracker.update(frame) for frame in frames[1:])
 
     time = timing.once(work)
@@ -98,7 +110,7 @@ def _run_ours(kind: Any, mode: str, frames: Frames, box: Box, options: dict[str,
         boxes=column("box", box),
         displacements=column("displacement", (np.nan, np.nan)),
         velocities=column("velocity", (0.0, 0.0)),
-        sights=column("los", centre),
+        windows=column("window_center", centre) if hasattr(results[0], "window_center") else None,
         scales=column("scale", 1.0),
         rotations=column("rotation", 0.0),
         milliseconds=1000 * time.busiest / (len(frames) - 1),

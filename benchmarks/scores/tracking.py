@@ -28,8 +28,8 @@ class Track:
     """(T, 2), measured step since the frame before, px."""
     velocities: Array | None = None
     """(T, 2), filtered velocity, px/frame."""
-    sights: Array | None = None
-    """(T, 2), middle of the window that is looked at, px."""
+    windows: Array | None = None
+    """(T, 2), center of the searched window, px."""
     scales: Array | None = None
     """(T,)."""
     rotations: Array | None = None
@@ -57,7 +57,7 @@ def scores(track: Track, truth: Truth) -> dict[str, float]:
 
     `on3`: share of frames with the centre within 3 px; `success`: share with intersection over union above
     0.5; `centre_error`: median, px; `displacement_error_x`, `_y` and `velocity_error_x`, `_y`: root mean
-    square against the true step since the frame before, px, from frame 6 on; `sight_on3`: as on3, of the
+    square against the true step since the frame before, px, from frame 6 on; `window_on3`: as on3, of the
     window's middle; `scale_error`: greatest relative one; `angle_error`: greatest, degrees; `mean_overlap`;
     `milliseconds` a frame.
     """
@@ -79,9 +79,9 @@ def scores(track: Track, truth: Truth) -> dict[str, float]:
                 f"{name}_error_{axis}": _root_mean_square((said - steps)[settled, k])
                 for k, axis in enumerate("xy")
             }
-    if track.sights is not None:
-        figures["sight_on3"] = float(
-            (np.linalg.norm(track.sights - truth.centres, axis=1)[counted] <= NEAR).mean()
+    if track.windows is not None:
+        figures["window_on3"] = float(
+            (np.linalg.norm(track.windows - truth.centres, axis=1)[counted] <= NEAR).mean()
         )
     if track.scales is not None and truth.scales is not None:
         figures["scale_error"] = float(np.abs(track.scales / truth.scales - 1)[counted].max())

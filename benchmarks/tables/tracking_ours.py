@@ -63,10 +63,10 @@ def noise(trackers: list[Tracker]) -> list[Row]:
         for tracker in _named(trackers, "layered", "local"):
             each = [_scores(replace(scene, noise_seed=seed), tracker) for seed in NOISE_SEEDS]
             row: Row = {"scene": scene.name, "tracker": tracker.name}
-            worse: dict[str, Callable[[Iterable[float]], float]] = {"success": min, "sight_on3": min}
+            worse: dict[str, Callable[[Iterable[float]], float]] = {"success": min, "window_on3": min}
             for column in (
                 "success",
-                "sight_on3",
+                "window_on3",
                 "centre_error",
                 "displacement_error_x",
                 "displacement_error_y",

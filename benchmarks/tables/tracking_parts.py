@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from benchmarks import report
+from benchmarks.rivals.trackers import has_reference
 from benchmarks.scenes.textures import Array, background
 
 Row = dict[str, object]
@@ -30,12 +31,12 @@ MASKED = 6
 
 
 def table() -> list[Row]:
-    """All rows, specified beside reached; none where jacoflow has no trackers."""
-    try:
-        from jacoflow import track
-    except ImportError:
+    """All rows, specified beside reached; none without the feature `reference`."""
+    if not has_reference():
         return []
-    return [*mask_rows(track), *gain_rows(track), *refined_rows(track), *gate_rows(track)]
+    from jacoflow import reference
+
+    return [*mask_rows(reference), *gain_rows(reference), *refined_rows(reference), *gate_rows(reference)]
 
 
 def reference_masks(order: int) -> tuple[Array, Array, Array]:
@@ -48,11 +49,11 @@ def reference_masks(order: int) -> tuple[Array, Array, Array]:
     return value, along_x, along_y
 
 
-def mask_rows(track: Any) -> list[Row]:
+def mask_rows(reference: Any) -> list[Row]:
     """The masks against least squares."""
     rows: list[Row] = []
     for order in ORDERS:
-        pairs = zip(track.derivative_kernels(order), reference_masks(order), strict=True)
+        pairs = zip(reference.derivative_kernels(order), reference_masks(order), strict=True)
         worst = max(float(np.abs(np.asarray(own) - exact).max()) for own, exact in pairs)
         rows.append(
             {
@@ -71,12 +72,12 @@ def shifted_texture(step: float) -> tuple[Array, Array]:
     return first, ndimage.shift(first, (-step / 2, step), order=5, mode="grid-wrap")
 
 
-def gain_rows(track: Any) -> list[Row]:
+def gain_rows(reference: Any) -> list[Row]:
     """Mean of u after a single step."""
     rows: list[Row] = []
     for order, asked in GAINS.items():
         for step, mean in zip(STEPS, asked, strict=True):
-            flow = inner_flow(track.local_flow(*shifted_texture(step), window=WINDOW, order=order, **UNGATED))
+            flow = inner_flow(reference.local_flow(*shifted_texture(step), window=WINDOW, order=order, **UNGATED))
             reached = float(np.nanmean(flow[..., 0]))
             rows.append(
                 {
@@ -88,11 +89,11 @@ def gain_rows(track: Any) -> list[Row]:
     return rows
 
 
-def refined_rows(track: Any) -> list[Row]:
+def refined_rows(reference: Any) -> list[Row]:
     """Error of the refined flow."""
     rows: list[Row] = []
     for step, asked in REFINED.items():
-        wrong = inner_flow(track.refine_flow(*shifted_texture(step), window=WINDOW, **UNGATED)) - (
+        wrong = inner_flow(reference.refine_flow(*shifted_texture(step), window=WINDOW, **UNGATED)) - (
             step,
             -step / 2,
         )
@@ -107,7 +108,7 @@ def refined_rows(track: Any) -> list[Row]:
     return rows
 
 
-def gate_rows(track: Any) -> list[Row]:
+def gate_rows(reference: Any) -> list[Row]:
     """Share of the pixels of a still, noisy picture that count as moving, without the gate of gradient
     strength and with it."""
     rows: list[Row] = []
@@ -116,7 +117,7 @@ def gate_rows(track: Any) -> list[Row]:
         ("flat:90", 0.0, "0.59"),
         ("smooth:4,90,20", 2.5, "< 0.0005"),
     ):
-        flow = accepted_flow(track.local_flow(*still_pair(kind), min_sigma=min_sigma))
+        flow = accepted_flow(reference.local_flow(*still_pair(kind), min_sigma=min_sigma))
         moving = (np.abs(flow[MASKED:-MASKED, MASKED:-MASKED]) >= 0.5).any(axis=-1)
         rows.append(
             {

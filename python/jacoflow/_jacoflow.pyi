@@ -55,10 +55,7 @@ __all__ = [
     "_StereoTracker",
     "_TrackGraph",
     "_classify",
-    "_derivative_kernels",
     "_detect_moving_target",
-    "_local_flow",
-    "_mean_flow",
     "_mixture_densities",
     "_mixture_dirichlet_densities",
     "_mixture_dirichlet_fit",
@@ -1186,14 +1183,8 @@ class _GradientTracker:
         frame: NDArray[Any],
         bbox: list[float] | None,
         center: list[float] | None,
-        method: str,
-        fov: int | None,
-        control: str,
         model: str,
         camera: str,
-        order: int | None,
-        window: int | None,
-        eps: float | None,
     ) -> _GradientTracker: ...
     def update(self, frame: NDArray[Any]) -> dict[str, Any]:
         """The target in the next frame, as a dictionary."""
@@ -1280,11 +1271,6 @@ class _TrackGraph:
     def __ne__(self, other: object, /) -> bool: ...
     __hash__: ClassVar[None]  # type: ignore[assignment]
 
-def _derivative_kernels(order: int) -> list[NDArray[np.float64]]: ...
-def _local_flow(
-    first: NDArray[Any], second: NDArray[Any], refine: bool, window: int, order: int, cond_max: float, min_sigma: float, step_max: float
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]: ...
-def _mean_flow(flow: NDArray[np.float64], accepted: NDArray[np.bool_], eps: float) -> tuple[list[float], list[float], int]: ...
 def _detect_moving_target(
     first: NDArray[Any], second: NDArray[Any], center: list[float] | None
 ) -> tuple[list[float], list[float]] | None: ...

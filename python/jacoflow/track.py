@@ -26,7 +26,7 @@ from typing import Any, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._jacoflow import _derivative_kernels, _detect_moving_target, _GaussMarkovFilter, _GradientTracker, _local_flow, _mean_flow
+from ._jacoflow import _detect_moving_target, _GaussMarkovFilter, _GradientTracker
 from ._particle_track import ParticleCorners, ParticleStep, ParticleTracker
 from ._particle_tracks import ParticleTrack, ParticleTracks, track_particles
 from ._stereo_options import StereoCamera, real_number
@@ -35,14 +35,12 @@ from ._stereo_track import StereoCluster, StereoStep, StereoTrack, StereoTracker
 __all__ = [
     "GaussMarkovFilter",
     "GradientTracker",
-    "MeanFlow",
     "MovingTarget",
     "ParticleCorners",
     "ParticleStep",
     "ParticleTrack",
     "ParticleTracker",
     "ParticleTracks",
-    "PixelFlow",
     "StereoCamera",
     "StereoCluster",
     "StereoStep",
@@ -51,11 +49,7 @@ __all__ = [
     "Track",
     "TrackGraph",
     "TrackResult",
-    "derivative_kernels",
     "detect_moving_target",
-    "local_flow",
-    "mean_flow",
-    "refine_flow",
     "track",
     "track_particles",
 ]
@@ -101,10 +95,6 @@ class TrackResult:
     """Normalised innovation squared of the position, both axes together, no unit."""
     gain: float
     """Brightness over that in the first frame, no unit."""
-    los: Array
-    """Line of sight: middle of the window that is looked at, (2,), px."""
-    n_flow: int
-    """How many pixels' flow was used ("local" and "paper"), no unit."""
     frame: int
     """Index of the frame, counted from the one the tracker began with (no unit)."""
 
@@ -123,7 +113,7 @@ class Track:
         return iter(self.results)
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("_") or name not in {field.name for field in fields(TrackResult)}:
+        if name.startswith("_") or name not in {field.name for field in fields(self.results[0])}:
             raise AttributeError(name)
         return np.array([getattr(result, name) for result in self.results])
 
@@ -142,23 +132,10 @@ class GradientTracker:
         The target's box in it, with x = centre - width / 2; sides of at least 3 px and at most twice the frame's; it may reach over the border.
     center : (x, y), px
         In place of a box: a point on the target; it is found as soon as it moves. With neither, the target is the first thing that moves; until then the status is "lost".
-    method : "layered", "local" or "paper"
-        "layered" (default): target and background as layers, one gradient step over the whole target from the filter's prediction. "local": the paper's loop (local flow in a window, its mean over what moves,
-        a Gauss-Markov filter) with the repairs that it needs. "paper": its text to the letter, which loses targets on all but flat backgrounds.
-    fov : int, px
-        Side of the window that is looked at ("local", "paper"), made odd; default 51, or 1.6 times the longer side of the box where that is more.
-    control : "integer" or "subpixel"
-        Whether that window moves in whole pixels (default) or not.
     model : "similarity" or "affine"
-        What the target's picture does besides moving ("layered"): turn and grow (default; stretched only where its outline is not explained otherwise), or be stretched as well.
+        What the target's picture does besides moving: turn and grow (default; stretched only where its outline is not explained otherwise), or be stretched as well.
     camera : "auto" or "none"
-        Whether the camera may move ("layered", default) or stands still, which is faster.
-    order : int
-        Degree of the polynomials behind the derivatives, 1 to 4 ("local": 4, "paper": 2).
-    window : int, px
-        Side of the windows of local flow, 3, 5 or 7 ("local": 7, "paper": 5).
-    eps : float or "auto", px/frame
-        Slowest flow that counts as motion ("local", "paper"); default 0.5; "auto": three deviations of the flow outside the target, at least 0.3.
+        Whether the camera may move (default) or stands still, which is faster.
 
     Raises
     ------
@@ -174,30 +151,16 @@ class GradientTracker:
         bbox: ArrayLike | None = None,
         *,
         center: ArrayLike | None = None,
-        method: str = "layered",
-        fov: int | None = None,
-        control: str = "integer",
         model: str = "similarity",
         camera: str = "auto",
-        order: int | None = None,
-        window: int | None = None,
-        eps: float | str = 0.5,
     ) -> None:
         box, point = _numbers("bbox", bbox, "(x, y, width, height)", 4), _numbers("center", center, "(x, y)", 2)
-        words = [_word(name, value) for name, value in (("method", method), ("control", control), ("model", model), ("camera", camera))]
-        mode, steering, shape, swing = words
-        side, degree, windows = (
-            None if value is None else _whole(name, value) for name, value in (("fov", fov), ("order", order), ("window", window))
-        )
-        if eps is None or (isinstance(eps, str) and eps != "auto"):
-            raise ValueError(f'eps: expected a speed in px/frame or "auto", got {eps!r}')
-        slowest = None if isinstance(eps, str) else _real("eps", eps)
-        self._tracker = _GradientTracker(_frame(frame), box, point, mode, side, steering, shape, swing, degree, windows, slowest)
+        self._tracker = _GradientTracker(_frame(frame), box, point, _word("model", model), _word("camera", camera))
 
     def update(self, frame: ArrayLike) -> TrackResult:
         """The target in the next frame, an array (H, W) as large as the first; a frame with NaN, infinity or samples beyond 1e9 grey levels counts as one in which the target was not seen.
 
-        So does, with "layered", a frame whose still scene has nothing to do with that of the frame before (far too bright, or noise): nothing is learnt from it. After ten in a row the scene is taken as it is. A constant
+        So does a frame whose still scene has nothing to do with that of the frame before (far too bright, or noise): nothing is learnt from it. After ten in a row the scene is taken as it is. A constant
         of more than 64 grey levels that is added to a whole frame is taken off.
 
         Raises
@@ -222,7 +185,7 @@ def _frame(frame: ArrayLike) -> NDArray[Any]:
 
 
 _WORDS = {
-    "method": '"layered", "local" or "paper"',
+    "method": '"local" or "paper"',
     "control": '"integer" or "subpixel"',
     "model": '"similarity" or "affine"',
     "camera": '"auto" or "none"',
@@ -285,6 +248,11 @@ def track(frames: Iterable[ArrayLike], bbox: ArrayLike | None = None, **options:
 
     Options are those of `GradientTracker`. The result has T entries.
     """
+    return _follow(GradientTracker, frames, bbox, options)
+
+
+def _follow(kind: type[GradientTracker], frames: Iterable[ArrayLike], bbox: ArrayLike | None, options: dict[str, Any]) -> Track:
+    """A tracker of a kind through frames."""
     try:
         rest = iter(frames)
     except TypeError:
@@ -293,75 +261,8 @@ def track(frames: Iterable[ArrayLike], bbox: ArrayLike | None = None, **options:
         first = next(rest)
     except StopIteration:
         raise ValueError("frames: expected at least one frame, got none") from None
-    tracker = GradientTracker(first, bbox, **options)
+    tracker = kind(first, bbox, **options)
     return Track((tracker.result, *(tracker.update(frame) for frame in rest)))
-
-
-def derivative_kernels(order: int) -> tuple[Array, Array, Array]:
-    """Beaudet's masks (value, along x, along y), three arrays (5, 5) [row, column] = [y, x]: value and slopes (1/px) at the middle of a least-squares polynomial of total degree `order`, 1 to 4."""
-    value, along_x, along_y = _derivative_kernels(_whole("order", order))
-    return value, along_x, along_y
-
-
-@dataclass(frozen=True, eq=False)
-class PixelFlow:
-    """Flow of single pixels of a frame (H, W), px/frame."""
-
-    flow: Array
-    """(H, W, 2), px/frame."""
-    valid: NDArray[np.bool_]
-    """(H, W), where it is accepted."""
-
-
-def local_flow(
-    first: ArrayLike, second: ArrayLike, *, window: int = 7, order: int = 4, cond_max: float = 10.0, min_sigma: float = 2.5, step_max: float = 4.0
-) -> PixelFlow:
-    """Flow of single pixels from a frame (H, W) to the next, one step from rest: M. Chiba and S. Ozawa, equations (1) to (8).
-
-    `.flow` (H, W, 2) is in px/frame, `.valid` (H, W) tells where it is accepted: condition number of the gradients in the window (side `window` px) up to `cond_max`, weakest gradient at least `min_sigma` grey
-    levels/px (and 0.7 times the frames' noise, unless it is 0), step up to `step_max` px.
-    """
-    return _flow_of_pixels(first, second, False, window=window, order=order, cond_max=cond_max, min_sigma=min_sigma, step_max=step_max)
-
-
-def refine_flow(
-    first: ArrayLike, second: ArrayLike, *, window: int = 7, order: int = 4, cond_max: float = 10.0, min_sigma: float = 2.5, step_max: float = 4.0
-) -> PixelFlow:
-    """As `local_flow`, refined by warping (9)(10) from pictures smoothed over 9 and 5 px to the frames (H, W) themselves; motions up to about 3 px."""
-    return _flow_of_pixels(first, second, True, window=window, order=order, cond_max=cond_max, min_sigma=min_sigma, step_max=step_max)
-
-
-def _flow_of_pixels(first: ArrayLike, second: ArrayLike, refined: bool, *, window: int, order: int, **limits: float) -> PixelFlow:
-    """Flow from a frame (H, W) to the next, px/frame; each option is checked by its name."""
-    sizes = _whole("window", window), _whole("order", order)
-    numbers = (_real(name, value) for name, value in limits.items())
-    return PixelFlow(*_local_flow(_frame(first), _frame(second), refined, *sizes, *numbers))
-
-
-@dataclass(frozen=True, eq=False)
-class MeanFlow:
-    """What moves in a frame, px/frame, and where: M. Chiba and S. Ozawa, equation (11)."""
-
-    velocity: Array
-    """Mean flow (u, v) over the pixels that move, px/frame; zero where nothing does."""
-    centroid: Array
-    """Their mean place (x, y), px; NaN where nothing moves."""
-    count: int
-    """How many they are, no unit."""
-
-
-def mean_flow(flow: PixelFlow, eps: float = 0.5) -> MeanFlow:
-    """Mean over the valid pixels of a field (H, W) whose flow along x or along y is at least `eps` px/frame: one set for both axes (11).
-
-    Raises `ValueError` for a negative `eps` and for arrays of another shape.
-    """
-    field, valid = np.ascontiguousarray(flow.flow, float), np.ascontiguousarray(flow.valid, bool)
-    if field.ndim != 3 or field.shape[2] != 2:
-        raise ValueError(f"flow: expected a field (H, W, 2), got shape {field.shape}")
-    if valid.shape != field.shape[:2]:
-        raise ValueError(f"valid: expected an array {field.shape[:2]} like the flow, got shape {valid.shape}")
-    velocity, centroid, count = _mean_flow(field, valid, _real("eps", eps))
-    return MeanFlow(np.array(velocity), np.array(centroid), count)
 
 
 @dataclass(frozen=True, eq=False)

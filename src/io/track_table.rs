@@ -6,7 +6,7 @@ use crate::types::TrackState;
 use std::path::Path;
 
 /// Columns before the covariance.
-const NUMBERS: [&str; 31] = [
+const NUMBERS: [&str; 28] = [
     "target",
     "frame",
     "time",
@@ -35,9 +35,6 @@ const NUMBERS: [&str; 31] = [
     "visibility",
     "innovation",
     "gain",
-    "line_of_sight_x",
-    "line_of_sight_y",
-    "flow_count",
 ];
 
 /// The entries of one axis's covariance that a symmetric matrix is known by, with their names: p position, v
@@ -55,7 +52,7 @@ const ENTRIES: [(&str, usize, usize); 6] =
 /// | `time` | s from the first frame of the input; `nan` where the frame rate is not known |
 /// | `status`, `reason` | words, as [`TrackStatus::name`](crate::types::TrackStatus::name) and [`TrackState::reason`] |
 /// | `reacquired`, `rotation_observable` | `true` or `false` |
-/// | `x`, `y`, `line_of_sight_x`, `line_of_sight_y` | px, centres of pixels at integers, x right, y down |
+/// | `x`, `y` | px, centres of pixels at integers, x right, y down |
 /// | `velocity_*`, `scene_velocity_*` | px/frame |
 /// | `acceleration_*` | px/frame^2 |
 /// | `camera_motion_*`, `displacement_*` | px since the frame before |
@@ -64,7 +61,6 @@ const ENTRIES: [(&str, usize, usize); 6] =
 /// | `rotation` | rad since the beginning, from x towards y |
 /// | `visibility` | share, 0 to 1 |
 /// | `innovation` | squared, over its variance: no unit |
-/// | `flow_count` | pixels |
 /// | `cov_x_pp`, `cov_x_pv`, `cov_x_pa`, `cov_x_vv`, `cov_x_va`, `cov_x_aa`, the same with `cov_y_` | covariance of position (p, px), velocity (v, px/frame) and acceleration (a, px/frame^2) along the axis |
 #[derive(Debug)]
 pub struct TrackTable {
@@ -138,8 +134,6 @@ impl TrackTable {
         cells.extend(pairs.into_iter().flatten().map(cell));
         cells.push(state.rotation_observable.to_string());
         cells.extend([state.visibility, state.innovation, state.gain].map(cell));
-        cells.extend(state.line_of_sight.map(cell));
-        cells.push(state.flow_count.to_string());
         cells.extend(state.covariance.iter().flat_map(|axis| ENTRIES.map(|(_, row, column)| cell(axis[row][column]))));
         cells.extend_from_slice(further);
         self.table.row(&cells)
@@ -199,9 +193,6 @@ mod tests {
             visibility: 0.2,
             innovation: 0.3,
             gain: 0.4,
-            line_of_sight: [0.5, 0.6],
-            fov: f64::NAN,
-            flow_count: 77,
             covariance: [axis(100.0), axis(200.0)],
         }
     }
@@ -218,7 +209,7 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap();
         let mut lines = csv::ReaderBuilder::new().from_reader(text.as_bytes());
         let names: Vec<String> = lines.headers().unwrap().iter().map(String::from).collect();
-        assert_eq!((names.len(), &names), (43, &TrackTable::columns()));
+        assert_eq!((names.len(), &names), (40, &TrackTable::columns()));
         let row = lines.records().next().unwrap().unwrap();
         let cell = |name: &str| &row[names.iter().position(|known| known == name).unwrap()];
         for (name, value) in [
@@ -243,8 +234,6 @@ mod tests {
             ("visibility", "0.2"),
             ("innovation", "0.3"),
             ("gain", "0.4"),
-            ("line_of_sight_y", "0.6"),
-            ("flow_count", "77"),
             ("cov_x_pp", "100"),
             ("cov_x_pa", "102"),
             ("cov_x_va", "104"),

@@ -26,6 +26,8 @@ mod options;
 mod particle_track;
 mod points;
 mod progress;
+#[cfg(feature = "reference")]
+mod reference_track;
 mod scenes;
 mod segment;
 mod spare;
@@ -82,6 +84,9 @@ mod _jacoflow {
     use super::particle_track::{PyParticleStep, PyParticleTracker, restore_step, restore_tracker, write_tables};
     #[pymodule_export]
     use super::points::{corners, point_flow};
+    #[cfg(feature = "reference")]
+    #[pymodule_export]
+    use super::reference_track::{flow, kernels, mean_flow, tracker};
     #[pymodule_export]
     use super::scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters};
     #[pymodule_export]
@@ -93,7 +98,7 @@ mod _jacoflow {
     #[pymodule_export]
     use super::target_scenes::{TargetScene, target_scene_names};
     #[pymodule_export]
-    use super::track::{PyGradientTracker, detect, flow, kernels, mean_flow};
+    use super::track::{PyGradientTracker, detect};
 
     #[pymodule_export]
     #[allow(non_upper_case_globals, reason = "Python's name of the attribute")]

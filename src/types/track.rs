@@ -117,12 +117,6 @@ pub struct TrackState {
     pub innovation: f64,
     /// Brightness of the target over that at the beginning.
     pub gain: f64,
-    /// Line of sight: centre of the window that is looked at, px.
-    pub line_of_sight: [f64; 2],
-    /// Side of that window, px; NaN for trackers that have none.
-    pub fov: f64,
-    /// How many pixels' flow was used.
-    pub flow_count: usize,
 }
 
 impl TrackState {
@@ -147,9 +141,6 @@ impl TrackState {
             visibility: 1.0,
             innovation: f64::NAN,
             gain: 1.0,
-            line_of_sight: position,
-            fov: f64::NAN,
-            flow_count: 0,
         }
     }
 }

@@ -127,9 +127,8 @@ fn mistakes_about_tracks_of_views_are_named_and_leave_nothing() {
     for (options, words) in [
         ("left --method stereo", &["input", "--layout"][..]),
         ("left right --method stereo --box 1,2,3,4", &["box", "gradient"]),
-        ("left right --method stereo --fov 31", &["fov", "gradient"]),
-        ("left right --method stereo --mode layered", &["mode", "improved or paper"]),
-        ("left.y4m --mode improved", &["mode", "layered"]),
+        ("left right --method stereo --model affine", &["model", "gradient"]),
+        ("left.y4m --mode improved", &["mode", "stereo and particle"]),
         ("left.y4m --graph g.png", &["graph", "stereo"]),
         ("left.y4m --layout side-by-side", &["layout", "stereo"]),
         ("left right --method stereo --components 0", &["n_components"]),

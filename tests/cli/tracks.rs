@@ -67,7 +67,7 @@ fn several_targets_become_rows_boxes_and_a_summary() {
     let ended = place.good(&format!("track s.y4m {BOX} --box 60,10,8,8 -o out --format csv,mot --json"));
     let summary = ended.json();
     assert_eq!((summary["frames"].as_u64(), summary["files"].as_u64()), (Some(6), Some(2)));
-    assert_eq!((summary["method"].as_str(), summary["mode"].as_str()), (Some("gradient"), Some("layered")));
+    assert_eq!(summary["method"].as_str(), Some("gradient"));
     let targets = summary["targets"].as_array().unwrap();
     assert_eq!(targets.len(), 2);
     for (index, target) in targets.iter().enumerate() {
@@ -95,17 +95,15 @@ fn several_targets_become_rows_boxes_and_a_summary() {
 fn a_moving_square_is_followed() {
     let place = recorded(20);
     for start in [BOX, "--point 26,30", ""] {
-        for mode in ["layered", "local"] {
-            let ended = place.good(&format!("track s.y4m {start} --mode {mode} --quiet"));
-            let table = rows(&ended.out);
-            assert_eq!(table.len(), 20);
-            for (index, row) in table.iter().enumerate().skip(3) {
-                let (left, top) = corner(index);
-                let centre = [left, top].map(|side| side as f64 + (SIDE / 2) as f64);
-                for (name, want) in ["x", "y"].into_iter().zip(centre) {
-                    let got: f64 = row[name].parse().unwrap();
-                    assert!((got - want).abs() < 2.0, "{start} {mode} frame {index} {name}: {got} {want}");
-                }
+        let ended = place.good(&format!("track s.y4m {start} --quiet"));
+        let table = rows(&ended.out);
+        assert_eq!(table.len(), 20);
+        for (index, row) in table.iter().enumerate().skip(3) {
+            let (left, top) = corner(index);
+            let centre = [left, top].map(|side| side as f64 + (SIDE / 2) as f64);
+            for (name, want) in ["x", "y"].into_iter().zip(centre) {
+                let got: f64 = row[name].parse().unwrap();
+                assert!((got - want).abs() < 2.0, "{start} frame {index} {name}: {got} {want}");
             }
         }
     }
@@ -125,19 +123,17 @@ fn frames_are_numbered_as_in_the_input() {
 #[test]
 fn pictures_show_the_box_and_may_be_enlarged() {
     let place = recorded(3);
-    for mode in ["layered", "local", "paper"] {
-        let ended = place.good(&format!("track s.y4m {BOX} --mode {mode} --overlay {mode} --enlarge 2"));
-        assert!(ended.out.is_empty(), "pictures alone are wanted");
-        let picture = read_image(place.path(mode).join("track_000000.png"), Colour::Luminance).unwrap();
-        assert_eq!(picture.size(), (2 * WIDTH, 2 * HEIGHT));
-        let plain = read_image(place.path(mode).join("track_000000.png"), Colour::Error);
-        assert!(plain.is_err(), "colours tell the status");
-    }
-    let again = place.line(&format!("track s.y4m {BOX} --overlay local"));
+    let ended = place.good(&format!("track s.y4m {BOX} --overlay boxes --enlarge 2"));
+    assert!(ended.out.is_empty(), "pictures alone are wanted");
+    let picture = read_image(place.path("boxes").join("track_000000.png"), Colour::Luminance).unwrap();
+    assert_eq!(picture.size(), (2 * WIDTH, 2 * HEIGHT));
+    let plain = read_image(place.path("boxes").join("track_000000.png"), Colour::Error);
+    assert!(plain.is_err(), "colours tell the status");
+    let again = place.line(&format!("track s.y4m {BOX} --overlay boxes"));
     assert!(again.code == 2 && again.err.contains("overlay") && again.err.contains("--force"), "{}", again.err);
-    place.good(&format!("track s.y4m {BOX} --overlay local --force"));
-    place.good(&format!("track s.y4m {BOX} --limit 2 --overlay local --force"));
-    assert_eq!(place.names("local"), ["track_000000.png", "track_000001.png"], "nothing of the longer run is left");
+    place.good(&format!("track s.y4m {BOX} --overlay boxes --force"));
+    place.good(&format!("track s.y4m {BOX} --limit 2 --overlay boxes --force"));
+    assert_eq!(place.names("boxes"), ["track_000000.png", "track_000001.png"], "nothing of the longer run is left");
     // A film instead, which is not replaced unasked; what is in it, the writer's own tests read back.
     let before = std::fs::read(place.path("s.y4m")).unwrap();
     let onto_itself = place.line(&format!("track s.y4m {BOX} --overlay ./s.y4m --force"));
@@ -171,20 +167,12 @@ fn mistakes_are_named_and_leave_nothing() {
     for (line, words) in [
         ("track", &["INPUT"][..]),
         ("track s.y4m --method magic", &["method", "gradient"]),
-        ("track s.y4m --mode best", &["--mode", "layered"]),
+        ("track s.y4m --mode best", &["--mode", "improved"]),
+        ("track s.y4m --mode improved", &["mode", "stereo and particle"]),
         ("track s.y4m --box 1,2,3", &["--box"]),
         ("track s.y4m --box 1,2,0,4", &["--box"]),
         ("track s.y4m --point 1", &["--point"]),
-        ("track s.y4m --fov 3", &["fov", "15"]),
-        ("track s.y4m --window 4", &["window", "3, 5 or 7"]),
-        ("track s.y4m --order 5", &["order"]),
-        ("track s.y4m --eps slow", &["--eps", "auto"]),
-        ("track s.y4m --control sideways", &["--control", "integer"]),
         ("track s.y4m --camera shaky", &["--camera"]),
-        ("track s.y4m --fov 31", &["fov", "local or paper", "layered"]),
-        ("track s.y4m --mode layered --eps auto", &["eps", "local or paper"]),
-        ("track s.y4m --mode local --model affine", &["model", "which is for layered", "local"]),
-        ("track s.y4m --mode paper --box 19,23,13,13 --camera none", &["camera", "layered", "paper"]),
         ("track s.y4m --model cubic", &["--model", "affine"]),
         ("track s.y4m -o out --format xml", &["format", "csv or mot"]),
         ("track s.y4m -o t.mp4", &["output", ".csv"]),

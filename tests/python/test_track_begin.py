@@ -67,11 +67,10 @@ def test_numbers_that_are_no_brightness_do_no_harm_later(value, white):
     frames[20] = value
     frames[21] += value
     frames[22, y : y + h, x : x + 5] = value
-    for method in ("layered", "local"):
-        found = track.track(frames, scene.start_box, method=method)
-        assert set(found.status[20:23]) == {"coasting"} and set(found.reason[20:23]) == {"the frame cannot be used"}
-        assert np.isfinite(found.position).all() and np.isfinite(found.covariance).all()
-        assert np.all(found.status[26:] == "tracking") and np.linalg.norm(found.position - scene.centres, axis=1)[26:].max() < 3.0
+    found = track.track(frames, scene.start_box)
+    assert set(found.status[20:23]) == {"coasting"} and set(found.reason[20:23]) == {"the frame cannot be used"}
+    assert np.isfinite(found.position).all() and np.isfinite(found.covariance).all()
+    assert np.all(found.status[26:] == "tracking") and np.linalg.norm(found.position - scene.centres, axis=1)[26:].max() < 3.0
     first = frames[0].copy()
     first[3, 4] = value
     with pytest.raises(ValueError, match="^frame: expected (finite samples|samples of at most)"):
@@ -83,31 +82,11 @@ FRAME = np.full((64, 256), 90, np.uint8)
 
 @pytest.mark.parametrize("switch", [True, np.True_])
 def test_switches_are_no_numbers(switch):
-    for name in ("fov", "order", "window", "eps"):
-        with pytest.raises(TypeError, match=f"^{name}: expected .*got .*True"):
-            track.GradientTracker(FRAME, (20, 20, 13, 13), method="local", **{name: switch})
     for arguments in ({"bbox": (20, 20, 13, switch)}, {"center": (20, switch)}):
         with pytest.raises(ValueError, match=f"^{next(iter(arguments))}: expected"):
             track.GradientTracker(FRAME, **arguments)
-    with pytest.raises(TypeError, match="^order"):
-        track.derivative_kernels(switch)
     with pytest.raises(TypeError, match="^alpha"):
         track.GaussMarkovFilter((0, 0), alpha=switch)
-
-
-@pytest.mark.parametrize(
-    ("method", "name", "value"),
-    [("layered", "fov", 31), ("layered", "control", "subpixel"), ("layered", "order", 4), ("layered", "window", 7), ("layered", "eps", 0.3), ("layered", "eps", "auto")]
-    + [(method, name, value) for method in ("local", "paper") for name, value in (("model", "affine"), ("camera", "none"))],
-)
-def test_options_of_another_method_are_refused(method, name, value):
-    with pytest.raises(ValueError, match=f"^{name}: expected no such option, which is for .* here, got {method}"):
-        track.GradientTracker(FRAME, (20, 20, 13, 13), method=method, **{name: value})
-
-
-def test_what_moves_first_is_looked_for_with_a_still_camera_in_every_method():
-    for method in ("layered", "local", "paper"):
-        assert track.GradientTracker(FRAME, method=method, camera="none").result.status == "lost"
 
 
 def test_points_may_be_anywhere_on_the_outer_pixels():

@@ -101,39 +101,14 @@ def test_a_level_that_stays_another_one_is_followed_at_once():
     assert success(scene, found) == 1.0 and np.all(found.status == "tracking")
 
 
-@pytest.mark.parametrize("level", [140.0, 200.0])
-@pytest.mark.parametrize("pan", [(-3.0, 1.0), (-1.0, 0.0), (-1.5, 0.5), (2.0, 2.0)])
-def test_local_does_not_claim_the_scene_for_its_target(pan, level):
-    """Under a camera that moves all that is in the window does; what is said to be tracked must be the target."""
-    scene = tracking_hard_scenes.scene("pan", square(circle(20.0), level=level), motion=line((0.0, 0.0), pan))
-    found = follow(scene, method="local")
-    far = np.linalg.norm(found.position - scene.centres, axis=1) > 10.0
-    assert np.mean((found.status == "tracking") & far) <= 0.15
-
-
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("method", None), ("method", b"local"), ("camera", True), ("model", 3), ("control", None), ("eps", None), ("eps", "slow")],
+    [("camera", True), ("camera", None), ("model", 3), ("model", b"affine")],
 )
 def test_words_of_another_kind_are_refused_by_name(name, value):
     frame = np.full((64, 64), 90, np.uint8)
     with pytest.raises(ValueError, match=f"^{name}: expected .*got"):
         track.GradientTracker(frame, (20, 20, 13, 13), **{name: value})
-
-
-@pytest.mark.parametrize(("name", "value"), [("fov", 51.5), ("order", "a"), ("window", 5.0), ("eps", [1, 2])])
-def test_numbers_of_another_kind_are_refused_by_name(name, value):
-    frame = np.full((64, 64), 90, np.uint8)
-    with pytest.raises(TypeError, match=f"^{name}: expected .*got"):
-        track.GradientTracker(frame, (20, 20, 13, 13), **{name: value})
-
-
-@pytest.mark.parametrize("function", [track.local_flow, track.refine_flow])
-def test_options_of_local_flow_are_refused_by_name(function):
-    frame = np.full((32, 32), 90, np.uint8)
-    for name in ("window", "order", "cond_max", "min_sigma", "step_max"):
-        with pytest.raises(TypeError, match=f"^{name}: expected"):
-            function(frame, frame, **{name: None})
 
 
 def test_options_of_the_filter_are_refused_by_name():
@@ -142,8 +117,6 @@ def test_options_of_the_filter_are_refused_by_name():
             track.GaussMarkovFilter((0, 0), **{name: None})
     with pytest.raises(ValueError, match="^measures: expected"):
         track.GaussMarkovFilter((0, 0), measures=None)
-    with pytest.raises(TypeError, match="^order: expected an integer"):
-        track.derivative_kernels(None)
 
 
 def bars(centre, size):

@@ -1,4 +1,4 @@
-"""Parts of the gradient tracker that stand for themselves: the Gauss-Markov filter, mean flow, and the first thing that moves."""
+"""Parts of the gradient tracker that stand for themselves: the Gauss-Markov filter and the first object that moves."""
 
 import pickle
 
@@ -95,23 +95,6 @@ def test_errors_of_the_filter_name_the_argument(arguments, names):
             kalman.update(**wrong)
 
 
-def test_mean_flow_has_one_set_for_both_axes():
-    flow, valid = np.zeros((6, 8, 2)), np.ones((6, 8), bool)
-    flow[2:4, 1:3] = (2.0, 0.1)
-    flow[2:4, 4] = (0.4, -1.0)
-    flow[0, 0], valid[0, 0] = (9.0, 9.0), False
-    found = track.mean_flow(track.PixelFlow(flow, valid))
-    assert found.count == 6
-    assert_allclose(found.velocity, ((4 * 2.0 + 2 * 0.4) / 6, (4 * 0.1 - 2 * 1.0) / 6))
-    assert_allclose(found.centroid, ((4 * 1.5 + 2 * 4) / 6, 2.5))
-    none = track.mean_flow(track.PixelFlow(flow, valid), eps=50.0)
-    assert none.count == 0 and np.isnan(none.centroid).all() and not none.velocity.any()
-    with pytest.raises(ValueError, match="eps"):
-        track.mean_flow(track.PixelFlow(flow, valid), eps=-1.0)
-    with pytest.raises(ValueError, match="valid"):
-        track.mean_flow(track.PixelFlow(flow, valid[:-1]))
-
-
 def test_what_moves_first_is_found_with_its_box():
     rng = np.random.default_rng(4)
     first = np.full((60, 130), 90.0)
@@ -131,21 +114,6 @@ def test_what_moves_first_is_found_with_its_box():
 
 
 FRAME = np.full((32, 32), 90, np.uint8)
-
-
-@pytest.mark.parametrize("name", ["order", "window"])
-@pytest.mark.parametrize(("value", "error"), [(-1, ValueError), (0, ValueError), (-(10**30), ValueError), (2.5, TypeError), ("x", TypeError)])
-def test_integers_are_refused_by_name(name, value, error):
-    with pytest.raises(error, match=name):
-        track.local_flow(FRAME, FRAME, **{name: value})
-    with pytest.raises(error, match=name):
-        track.refine_flow(FRAME, FRAME, **{name: value})
-    with pytest.raises(error, match=name):
-        track.GradientTracker(FRAME, (9, 9, 9, 9), method="local", **{name: value})
-    with pytest.raises(error, match="fov"):
-        track.GradientTracker(FRAME, (9, 9, 9, 9), fov=value)
-    with pytest.raises(error, match="order"):
-        track.derivative_kernels(value)
 
 
 @pytest.mark.parametrize(("value", "error"), [(-1, ValueError), (1.5, TypeError), ("x", TypeError)])
@@ -172,12 +140,6 @@ def test_the_filter_names_its_arguments():
             point.update(position=(1, 2), position_variance=variance)
         with pytest.raises(ValueError, match="velocity_variance: expected"):
             point.update(velocity=(1, 2), velocity_variance=variance)
-
-
-@pytest.mark.parametrize(("flow", "valid", "name"), [((8, 9), (8, 9), "flow"), ((8, 9, 3), (8, 9), "flow"), ((8, 9, 2), (9, 8), "valid"), ((8, 9, 2), (8,), "valid")])
-def test_mean_flow_refuses_other_shapes(flow, valid, name):
-    with pytest.raises(ValueError, match=f"{name}: expected"):
-        track.mean_flow(track.PixelFlow(np.zeros(flow), np.zeros(valid, bool)))
 
 
 @pytest.mark.parametrize("measures", ["mean", "instant"])

@@ -84,22 +84,3 @@ def test_what_is_behind_the_target_is_not_taken_for_what_is_before_it(larger):
     path = straight((1.5, 0.5))
     found = track.track(movie(path, 21), box_about(path[0], 21 * larger))
     assert np.linalg.norm(found.position - path, axis=1).max() < 1.5 and np.mean(found.status == "tracking") > 0.9
-
-
-@pytest.mark.parametrize("side", [21, 31, 41, 61])
-def test_local_holds_large_even_targets_by_their_ends(side):
-    path = straight((1.5, 0.3))
-    found = track.track(movie(path, side), box_about(path[0], side), method="local")
-    errors = np.linalg.norm(found.position - path, axis=1)
-    assert errors.max() < 2.0 and np.median(errors) < 0.8 and held(found, path) > 0.9
-
-
-@pytest.mark.parametrize("side", [21, 31, 41])
-@pytest.mark.parametrize("down", [False, True])
-def test_local_knows_where_a_target_is_that_is_half_out(side, down):
-    """Its visible end tells it, and not the mean of what is left."""
-    there = 1.5 * (np.minimum(np.arange(80), 40) - np.maximum(np.arange(80) - 50, 0))
-    path = np.stack([100 + 0 * there, SHAPE[0] - 61 + there] if down else [SHAPE[1] - 61 + there, 70 + 0 * there], axis=1)
-    found = track.track(movie(path, side), box_about(path[0], side), method="local")
-    errors = np.linalg.norm(found.position - path, axis=1)
-    assert errors.max() < 6.0 and np.median(errors) < 1.2 and errors[-5:].mean() < 2.0

@@ -178,7 +178,7 @@ def test_scores():
     exact = trackers.Track(scene.boxes, steps, steps, scene.centres, scene.scales, scene.angles, milliseconds=2.0)
     best = scores(exact, Truth.of(scene))
     assert best.pop("milliseconds") == 2.0
-    assert [best.pop(name) for name in ("on3", "success", "mean_overlap", "sight_on3")] == pytest.approx([1.0] * 4)
+    assert [best.pop(name) for name in ("on3", "success", "mean_overlap", "window_on3")] == pytest.approx([1.0] * 4)
     assert max(best.values()) < 1e-9 and len(best) == 7
     half = scene.boxes + np.where(np.arange(51) > 25, 8.0, 0.5)[:, None] * (1, 0, 0, 0)
     worse = scores(trackers.Track(half, steps + (0.3, 0.0)), Truth.of(scene))

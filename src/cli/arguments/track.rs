@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::track::METHODS;
-use crate::track::gradient::{CameraMotion, Control, GradientOptions, Mode, Shape, Start};
+use crate::track::gradient::{CameraMotion, GradientOptions, Shape, Start};
 use crate::track::particle::ParticleMode;
 use crate::track::stereo::StereoMode;
 use crate::types::TargetBox;
@@ -44,56 +44,28 @@ pub struct TrackerArguments {
     /// in colour) or stereo (everything that moves before two cameras)
     #[arg(long, value_name = "NAME", default_value = "gradient")]
     pub method: String,
-    /// Which system follows the targets [default: layered, stereo and particle improved]
+    /// Variant of stereo and particle [default: improved]
     #[arg(long, value_enum, value_name = "NAME")]
     pub mode: Option<ModeWord>,
     /// Seed of the random numbers (stereo, particle) [default: 0]
     #[arg(long, value_name = "N")]
     pub random_state: Option<u64>,
-    /// Side of the window that is looked at, px (local, paper), made odd [default: 51, or 1.6 times the box]
-    #[arg(long, value_name = "PX")]
-    pub fov: Option<usize>,
-    /// How the window follows the target (local) [default: integer]
-    #[arg(long, value_enum, value_name = "HOW")]
-    pub control: Option<ControlWord>,
-    /// What the target's picture does besides moving (layered) [default: similarity]
+    /// What the target's picture does besides moving (gradient) [default: similarity]
     #[arg(long, value_enum, value_name = "NAME")]
     pub model: Option<ModelWord>,
-    /// What the camera does (layered) [default: auto]
+    /// What the camera does (gradient) [default: auto]
     #[arg(long, value_enum, value_name = "WHAT")]
     pub camera: Option<CameraWord>,
-    /// Degree of the polynomials behind the derivatives, 1 to 4 [default: 4, paper 2]
-    #[arg(long, value_name = "N")]
-    pub order: Option<usize>,
-    /// Side of the windows of local flow, 3, 5 or 7 px [default: 7, paper 5]
-    #[arg(long, value_name = "PX")]
-    pub window: Option<usize>,
-    /// Slowest flow that counts as motion, px/frame, or auto: from the flow outside the target [default: 0.5]
-    #[arg(long, value_name = "SPEED|auto", value_parser = parse_eps, allow_hyphen_values = true)]
-    pub eps: Option<Eps>,
 }
 
-/// Which system follows the target.
+/// Variant of a tracker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ModeWord {
-    /// Target and background as layers; the most accurate
-    Layered,
-    /// Local flow in a moving window, with the repairs that it needs; the fastest
-    Local,
     /// Stereo: motion to fractions of a pixel carries the clusters along; particle: corner tracks must move
     /// with their target
     Improved,
     /// The paper's text to the letter, for comparison
     Paper,
-}
-
-/// How the window follows the target.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ControlWord {
-    /// In whole pixels
-    Integer,
-    /// To fractions of a pixel
-    Subpixel,
 }
 
 /// What the target's picture does.
@@ -114,15 +86,6 @@ pub enum CameraWord {
     None,
 }
 
-/// The slowest flow that counts as motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Eps {
-    /// Measured.
-    Auto,
-    /// In px/frame.
-    Speed(f64),
-}
-
 impl TrackerArguments {
     /// The method's name, one that is known.
     ///
@@ -135,17 +98,7 @@ impl TrackerArguments {
 
     /// Whether an option of the gradient tracker alone was given.
     pub fn given(&self) -> Option<&'static str> {
-        [
-            self.fov.map(|_| "fov"),
-            self.control.map(|_| "control"),
-            self.model.map(|_| "model"),
-            self.camera.map(|_| "camera"),
-            self.order.map(|_| "order"),
-            self.window.map(|_| "window"),
-            self.eps.map(|_| "eps"),
-        ]
-        .into_iter()
-        .find_map(|given| given)
+        self.model.map(|_| "model").or(self.camera.map(|_| "camera"))
     }
 
     /// The options of the gradient tracker.
@@ -153,30 +106,11 @@ impl TrackerArguments {
     /// # Errors
     /// [`Error::Argument`] naming the option.
     pub fn gradient(&self) -> Result<GradientOptions> {
+        if self.mode.is_some() {
+            return Err(Error::argument("mode", "no mode, which is for stereo and particle", "a mode with gradient"));
+        }
         let defaults = GradientOptions::default();
-        let options = GradientOptions {
-            mode: match self.mode {
-                None => defaults.mode,
-                Some(ModeWord::Layered) => Mode::Layered,
-                Some(ModeWord::Local) => Mode::Local,
-                Some(ModeWord::Paper) => Mode::Paper,
-                Some(ModeWord::Improved) => {
-                    return Err(Error::argument("mode", "layered, local or paper for gradient", "improved"));
-                }
-            },
-            fov: self.fov,
-            control: match self.control {
-                None => defaults.control,
-                Some(ControlWord::Integer) => Control::Integer,
-                Some(ControlWord::Subpixel) => Control::Subpixel,
-            },
-            window: self.window,
-            order: self.order,
-            eps: match self.eps {
-                None => defaults.eps,
-                Some(Eps::Auto) => None,
-                Some(Eps::Speed(speed)) => Some(speed),
-            },
+        Ok(GradientOptions {
             shape: match self.model {
                 None => defaults.shape,
                 Some(ModelWord::Similarity) => Shape::Similarity,
@@ -187,36 +121,22 @@ impl TrackerArguments {
                 Some(CameraWord::Auto) => CameraMotion::Auto,
                 Some(CameraWord::None) => CameraMotion::None,
             },
-        };
-        options.check()?;
-        Ok(options)
+        })
     }
 
     /// The mode of the stereo tracker.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] named `mode`.
-    pub fn stereo_mode(&self) -> Result<StereoMode> {
+    pub fn stereo_mode(&self) -> StereoMode {
         match self.mode {
-            None | Some(ModeWord::Improved) => Ok(StereoMode::Improved),
-            Some(ModeWord::Paper) => Ok(StereoMode::Paper),
-            Some(ModeWord::Layered | ModeWord::Local) => {
-                Err(Error::argument("mode", "improved or paper for stereo", "a mode of gradient"))
-            }
+            None | Some(ModeWord::Improved) => StereoMode::Improved,
+            Some(ModeWord::Paper) => StereoMode::Paper,
         }
     }
 
     /// The mode of the particle tracker.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] named `mode`.
-    pub fn particle_mode(&self) -> Result<ParticleMode> {
+    pub fn particle_mode(&self) -> ParticleMode {
         match self.mode {
-            None | Some(ModeWord::Improved) => Ok(ParticleMode::Improved),
-            Some(ModeWord::Paper) => Ok(ParticleMode::Paper),
-            Some(ModeWord::Layered | ModeWord::Local) => {
-                Err(Error::argument("mode", "improved or paper for particle", "a mode of gradient"))
-            }
+            None | Some(ModeWord::Improved) => ParticleMode::Improved,
+            Some(ModeWord::Paper) => ParticleMode::Paper,
         }
     }
 }
@@ -238,28 +158,18 @@ fn parse_point(text: &str) -> std::result::Result<[f64; 2], String> {
     numbers(text).ok_or_else(|| "expected two numbers X,Y in pixels".into())
 }
 
-fn parse_eps(text: &str) -> std::result::Result<Eps, String> {
-    match text.parse::<f64>() {
-        _ if text == "auto" => Ok(Eps::Auto),
-        Ok(speed) if speed >= 0.0 && speed.is_finite() => Ok(Eps::Speed(speed)),
-        _ => Err("expected a speed in px/frame of at least 0, or auto".into()),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn boxes_points_and_speeds_are_read() {
+    fn boxes_and_points_are_read() {
         assert_eq!(parse_box("-1.5, 2,13,5"), Ok(TargetBox { x: -1.5, y: 2.0, width: 13.0, height: 5.0 }));
         for wrong in ["1,2,3", "1,2,0,3", "1,2,3,4,5", "1,2,nan,3", "a,b,c,d", ""] {
             assert!(parse_box(wrong).is_err(), "{wrong}");
         }
         assert_eq!(parse_point("3.5,-4"), Ok([3.5, -4.0]));
         assert!(parse_point("3").is_err() && parse_point("inf,1").is_err());
-        assert_eq!((parse_eps("auto"), parse_eps("0.3")), (Ok(Eps::Auto), Ok(Eps::Speed(0.3))));
-        assert!(parse_eps("-1").is_err() && parse_eps("slow").is_err() && parse_eps("nan").is_err());
     }
 
     #[test]

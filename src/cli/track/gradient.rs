@@ -37,7 +37,7 @@ impl TrackCommand {
             .with_preprocess(preprocess(&self.input, None)?)
             .with_threads(threads)
             .with_numbering(opened.numbering);
-        let details = self.details(&opened, &options);
+        let details = self.details(&opened);
         let rate = opened.numbering.rate;
         let begin = |frame: &Frame<f64>| {
             let trackers = trackers(frame, &self.targets.starts(), &options)?;
@@ -64,11 +64,11 @@ impl TrackCommand {
         Ok(sinks)
     }
 
-    fn details(&self, opened: &Opened, options: &GradientOptions) -> Value {
+    fn details(&self, opened: &Opened) -> Value {
         let (width, height) = opened.first.size;
         json!({
             "input": opened.name, "width": width, "height": height, "dtype": opened.first.dtype, "fps": opened.numbering.rate,
-            "method": self.tracker.method, "mode": options.mode.name(),
+            "method": self.tracker.method,
         })
     }
 }

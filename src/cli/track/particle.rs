@@ -22,7 +22,7 @@ impl TrackCommand {
         self.refuse(self.targets.points.first().map(|_| "point").or(self.tracker.given()), "gradient")?;
         self.refuse(self.stereo.given(), "stereo")?;
         self.refuse_changes_of_grey()?;
-        let mode = self.tracker.particle_mode()?;
+        let mode = self.tracker.particle_mode();
         let options = self.particle.options(mode, self.tracker.random_state, Threads::new(self.threads.threads)?)?;
         let wanted = self.texts()?;
         self.check_pictures_of_particles()?;

@@ -27,7 +27,7 @@ impl TrackCommand {
             return Err(Error::argument("limit", "at least 2 pairs of views to track through", limit));
         }
         let threads = Threads::new(self.threads.threads)?;
-        let options = self.stereo.options(self.tracker.stereo_mode()?, self.tracker.random_state, threads)?;
+        let options = self.stereo.options(self.tracker.stereo_mode(), self.tracker.random_state, threads)?;
         let pictures = self.pictures(&options);
         let drawn = !pictures.is_empty() || self.stereo.graph.is_some();
         let wanted = self.output.wanted(self.tell.json, drawn)?;

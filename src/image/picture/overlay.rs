@@ -19,9 +19,6 @@ const CROSS: f64 = 3.0;
 /// Longest side and length that are drawn, px: a target that ran away must not cost strokes without end.
 const LONGEST: f64 = 1e5;
 
-/// Colour of the window about the line of sight.
-const WINDOW: Rgb = [235, 235, 235];
-
 /// Colour of a target by how well it is in hand, told apart by people with any kind of colour vision: green
 /// tracking, orange occluded, blue coasting, grey out, red lost.
 ///
@@ -71,8 +68,8 @@ pub type PathPoint = ([f64; 2], TrackStatus);
 impl TrackOverlay {
     /// Draws target number `target` over `picture`: its box, turned by its rotation where that is observable;
     /// the path that it came, in the colours of its status; its centre as a cross, with the ellipse that
-    /// holds the true centre with 95 % certainty if the covariance is right; the window about the line of
-    /// sight, dashed; the number at the box. What is not finite is left out.
+    /// holds the true centre with 95 % certainty if the covariance is right; the number at the box. What is
+    /// not finite is left out.
     pub fn draw(&self, picture: &mut Picture, target: usize, state: &TrackState, path: &[PathPoint]) {
         let by_target = self.colours == TrackColours::Target;
         let colour_of = |status| if by_target { identity_colour(target as u64) } else { status_colour(status) };
@@ -83,7 +80,6 @@ impl TrackOverlay {
         if by_target && matches!(state.status, TrackStatus::Out | TrackStatus::Lost) {
             return;
         }
-        self.draw_window(picture, state);
         let corners = box_corners(state);
         if by_target && !state.status.is_measured() {
             self.dashed_polygon(picture, &corners, colour);
@@ -123,16 +119,6 @@ impl TrackOverlay {
         let [x, y] = self.on_picture(centre);
         draw_stroke(picture, (x - CROSS, y), (x + CROSS, y), self.thickness, colour);
         draw_stroke(picture, (x, y - CROSS), (x, y + CROSS), self.thickness, colour);
-    }
-
-    /// The window about the line of sight, dashed.
-    fn draw_window(&self, picture: &mut Picture, state: &TrackState) {
-        let ([x, y], half) = (state.line_of_sight, state.fov / 2.0);
-        if half.is_nan() || half >= LONGEST {
-            return;
-        }
-        let corners = [[x - half, y - half], [x + half, y - half], [x + half, y + half], [x - half, y + half]];
-        self.dashed_polygon(picture, &corners, WINDOW);
     }
 
     fn dashed_polygon(&self, picture: &mut Picture, corners: &[[f64; 2]], colour: Rgb) {
@@ -226,16 +212,13 @@ mod tests {
     }
 
     #[test]
-    fn path_window_and_status_have_their_colours() {
-        let lost = TrackState { status: TrackStatus::Lost, fov: 30.0, ..state() };
+    fn path_and_status_have_their_colours() {
+        let lost = TrackState { status: TrackStatus::Lost, ..state() };
         let path = [([5.0, 40.0], TrackStatus::Tracking), ([15.0, 40.0], TrackStatus::Coasting)];
         let overlay = TrackOverlay::default();
         let picture = drawn(overlay, &lost, &path);
         assert_eq!(picture.pixel(10, 40), status_colour(TrackStatus::Coasting));
         assert_eq!(picture.pixel(30, 15), status_colour(TrackStatus::Lost));
-        assert_eq!(picture.pixel(16, 5), [235; 3]);
-        let dark = (15..46).filter(|x| picture.pixel(*x, 5) == GREY).count();
-        assert!(dark >= 4, "the window is dashed");
     }
 
     #[test]
@@ -268,7 +251,6 @@ mod tests {
         let mut unknown = state();
         unknown.bounds.x = f64::NAN;
         unknown.position = [f64::NAN; 2];
-        (unknown.line_of_sight, unknown.fov) = ([f64::NAN; 2], 51.0);
         unknown.covariance[0][0][0] = f64::NAN;
         let overlay = TrackOverlay::default();
         assert_eq!(drawn(overlay, &unknown, &[]), Picture::filled(64, 48, GREY));

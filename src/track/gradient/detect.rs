@@ -1,6 +1,6 @@
 //! The first thing that moves: its box from two frames, where nobody gave one.
 
-use super::local_flow::noise_of;
+use super::noise::noise_of;
 use crate::types::{Frame, TargetBox};
 
 /// Change over the noise of a difference that is one.
@@ -64,12 +64,15 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
     let explain = |object: &[(usize, usize)]| displacement(&between, second, object, noise);
     // What an even target uncovers and what it covers lie apart, as far as it is long: together they are
     // explained without a rest.
-    let whole = objects.iter().filter(|other| are_ends(&object, other)).filter_map(|other| {
-        let both = [&object[..], other].concat();
-        let (cost, displacement) = explain(&both)?;
-        let explained = cost <= ALIKE.1 * noise && are_as_thick(&object, other, displacement);
-        explained.then_some((displacement, both))
-    });
+    let whole = objects
+        .iter()
+        .filter(|other| crate::ablation::keeps("gradient.detect_ends") && are_ends(&object, other))
+        .filter_map(|other| {
+            let both = [&object[..], other].concat();
+            let (cost, displacement) = explain(&both)?;
+            let explained = cost <= ALIKE.1 * noise && are_as_thick(&object, other, displacement);
+            explained.then_some((displacement, both))
+        });
     // The nearest: there may be others like it, farther on.
     let area = |object: &[(usize, usize)]| extent(object).map(|[low, high]| high - low + 1).iter().product::<usize>();
     let whole = whole.min_by_key(|(_, both)| area(both));
@@ -89,7 +92,10 @@ fn changed(first: &Frame<f64>, second: &Frame<f64>, noise: f64) -> Frame<bool> {
 }
 
 /// Whether so much changes that the camera must have moved: one target alone changes little.
-pub(super) fn much_changes(first: &Frame<f64>, second: &Frame<f64>) -> bool {
+pub(super) fn camera_moved(first: &Frame<f64>, second: &Frame<f64>) -> bool {
+    if !crate::ablation::keeps("gradient.detect_camera") {
+        return false;
+    }
     let changed = changed(first, second, LEAST_NOISE.max(noise_of(first, second).min(MOST_NOISE)));
     let count = changed.data().iter().filter(|changed| **changed).count();
     count as f64 > MUCH * changed.data().len() as f64

@@ -1,76 +1,77 @@
-//! The gradient tracker: a moving target followed by the gradient equation, a prediction and a moving window.
+//! The gradient tracker: a moving target followed by the gradient equation, a prediction and two layers.
 //!
 //! Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method"
-//! (IPSJ).
+//! (IPSJ). Their idea is kept (the gradient equation, a prediction in place of iterations, a stopped
+//! background, a Gauss-Markov filter), but the equation is solved once for the pose of the whole segmented
+//! target. Their own loop is in `reference`, behind the feature of that name.
 //!
-//! Three systems follow the target ([`Mode`]): the paper's loop to the letter, the same with the repairs that
-//! it needs, and one that keeps its idea (the gradient equation, a prediction in place of iterations, a
-//! stopped background, a Gauss-Markov filter) but solves the equation once over the whole segmented target.
+//! A target starts with a box, or with what moves first (`start`, `detect`); then each frame passes the stages
+//! of `layered`, which filters the position by `gauss_markov`.
 
 mod detect;
-mod equations;
-mod extent;
 mod gauss_markov;
-mod kernels;
 mod layered;
-mod local;
-mod local_flow;
+mod noise;
 mod options;
-mod refine;
-mod rules;
-mod window;
+#[cfg(feature = "reference")]
+pub mod reference;
+mod shift;
+mod start;
 
 pub use detect::{MovingTarget, detect_moving_target};
 pub use gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
-pub use kernels::{DerivativeKernels, KernelMask, derivative_kernels};
-pub use local_flow::{LocalFlow, LocalFlowOptions, MeanFlow, local_flow};
-pub use options::{CameraMotion, Control, GradientOptions, Mode, Shape, Start};
-pub use refine::{RefineOptions, refine_flow};
+pub use options::{CameraMotion, GradientOptions, Shape, Start};
 
 use super::Tracker;
-use super::grey_levels::GREATEST;
 use crate::error::{Error, Result};
-use crate::image::all_finite;
-use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
-use layered::Layered;
-use local::LocalLoop;
-
-/// Smallest side of a frame, px.
-const LEAST_FRAME: usize = 16;
-/// Smallest side of a target, px.
-const LEAST_BOX: f64 = 3.0;
-
-/// Largest box, in sides of the frame.
-const LARGEST_BOX: f64 = 2.0;
+use crate::types::{Frame, TargetBox, TrackState};
+use layered::State;
+#[cfg(feature = "reference")]
+use reference::{LocalLoop, ReferenceOptions, SearchWindow};
+use start::Waiting;
 
 /// What follows the target.
-#[derive(Debug)]
-enum Engine {
-    /// Nothing has moved yet: the last frame, and where to look.
-    Waiting(Frame<f64>, Option<[f64; 2]>),
-    Local(Box<LocalLoop>),
-    Layered(Box<Layered>),
+#[derive(Debug, Clone)]
+enum Method {
+    Layered(GradientOptions),
+    #[cfg(feature = "reference")]
+    Reference(ReferenceOptions),
 }
 
-impl Engine {
-    /// Begins with a box in a frame.
-    fn new(frame: &Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
-        match options.mode {
-            Mode::Layered => Self::Layered(Box::new(Layered::new(frame.clone(), bounds, options))),
-            Mode::Local | Mode::Paper => Self::Local(Box::new(LocalLoop::new(frame, bounds, options))),
+impl Method {
+    /// What the camera may do until the target moves.
+    fn camera(&self) -> CameraMotion {
+        match self {
+            Self::Layered(options) => options.camera,
+            #[cfg(feature = "reference")]
+            Self::Reference(options) => options.camera,
         }
     }
 
-    /// The target at the beginning.
-    fn begun(&self, bounds: TargetBox) -> TrackState {
-        let covariance = match self {
-            Self::Waiting(..) => [[[f64::NAN; 3]; 3]; 2],
-            Self::Local(engine) => engine.covariance(),
-            Self::Layered(engine) => engine.covariance(),
+    /// Begins with a box in a frame.
+    fn begin(&self, frame: &Frame<f64>, bounds: TargetBox) -> (TrackState, Engine) {
+        let (covariance, engine) = match self {
+            Self::Layered(options) => {
+                let layered = State::new(frame.clone(), bounds, options);
+                (layered.covariance(), Engine::Layered(Box::new(layered)))
+            }
+            #[cfg(feature = "reference")]
+            Self::Reference(options) => {
+                let local = LocalLoop::new(frame, bounds, options);
+                (local.covariance(), Engine::Local(Box::new(local)))
+            }
         };
-        let fov = if let Self::Local(engine) = self { engine.fov() } else { f64::NAN };
-        TrackState { covariance, fov, ..TrackState::at(bounds.centre(), bounds) }
+        (TrackState { covariance, ..TrackState::at(bounds.centre(), bounds) }, engine)
     }
+}
+
+/// The method at work.
+#[derive(Debug)]
+enum Engine {
+    Waiting(Waiting),
+    Layered(Box<State>),
+    #[cfg(feature = "reference")]
+    Local(Box<LocalLoop>),
 }
 
 /// Follows one target.
@@ -78,7 +79,7 @@ impl Engine {
 pub struct GradientTracker {
     state: TrackState,
     size: (usize, usize),
-    options: GradientOptions,
+    method: Method,
     engine: Engine,
 }
 
@@ -88,119 +89,40 @@ impl GradientTracker {
     ///
     /// # Errors
     /// [`Error::Argument`] naming `frame` (smaller than 16 px a side, not finite), `bbox` (a side under 3 px,
-    /// wholly outside, not finite), `center` (outside) or the option.
+    /// wholly outside, not finite) or `center` (outside).
     pub fn new(frame: &Frame<f64>, start: Start, options: &GradientOptions) -> Result<Self> {
+        Self::begin(frame, start, Method::Layered(options.clone()))
+    }
+
+    /// The same with the paper's loop.
+    ///
+    /// # Errors
+    /// As [`GradientTracker::new`], and [`Error::Argument`] naming an option out of range.
+    #[cfg(feature = "reference")]
+    pub fn reference(frame: &Frame<f64>, start: Start, options: &ReferenceOptions) -> Result<Self> {
         options.check()?;
-        options.check_camera(start)?;
-        check_frame(frame)?;
+        Self::begin(frame, start, Method::Reference(options.clone()))
+    }
+
+    fn begin(frame: &Frame<f64>, start: Start, method: Method) -> Result<Self> {
+        start::check_frame(frame)?;
+        let waiting = |near| Engine::Waiting(Waiting::new(frame, near));
         let (state, engine) = match start {
-            Start::Box(bounds) => {
-                let bounds = checked_box(bounds, frame.size())?;
-                let engine = Engine::new(frame, bounds, options);
-                (engine.begun(bounds), engine)
-            }
-            Start::Centre(at) => {
-                (nothing_yet(checked_point(at, frame.size())?), Engine::Waiting(frame.clone(), Some(at)))
-            }
+            Start::Box(bounds) => method.begin(frame, start::checked_box(bounds, frame.size())?),
+            Start::Centre(at) => (start::nothing_yet(start::checked_point(at, frame.size())?), waiting(Some(at))),
             Start::Motion => {
-                let middle = [frame.width() as f64 / 2.0 - 0.5, frame.height() as f64 / 2.0 - 0.5];
-                (nothing_yet(middle), Engine::Waiting(frame.clone(), None))
+                let middle = [frame.width(), frame.height()].map(|length| length as f64 / 2.0 - 0.5);
+                (start::nothing_yet(middle), waiting(None))
             }
         };
-        Ok(Self { state, size: frame.size(), options: options.clone(), engine })
+        Ok(Self { state, size: frame.size(), method, engine })
     }
 
-    /// Looks for what moves first.
-    fn wait(&mut self, frame: &Frame<f64>) {
-        let Engine::Waiting(previous, near) = &mut self.engine else { return };
-        let still = match self.options.camera {
-            CameraMotion::Auto if detect::much_changes(previous, frame) => layered::stilled(previous, frame),
-            CameraMotion::Auto | CameraMotion::None => None,
-        };
-        let found = detect_moving_target(still.as_ref().unwrap_or(previous), frame, *near).map(|found| found.bounds);
-        match found.and_then(|bounds| checked_box(bounds, self.size).ok()) {
-            Some(bounds) => {
-                let engine = Engine::new(frame, bounds, &self.options);
-                let state = engine.begun(bounds);
-                self.state = TrackState { frame: self.state.frame, reason: "the first thing that moves", ..state };
-                self.engine = engine;
-            }
-            None => *previous = frame.clone(),
-        }
+    /// The window that the paper's loop searches, once it follows a target.
+    #[cfg(feature = "reference")]
+    pub fn search_window(&self) -> Option<SearchWindow> {
+        if let Engine::Local(local) = &self.engine { Some(local.window()) } else { None }
     }
-}
-
-/// A target that has not moved yet.
-fn nothing_yet(at: [f64; 2]) -> TrackState {
-    TrackState {
-        status: TrackStatus::Lost,
-        reason: "nothing has moved yet",
-        visibility: 0.0,
-        covariance: [[[f64::NAN; 3]; 3]; 2],
-        ..TrackState::at(at, TargetBox::about(at, 0.0, 0.0))
-    }
-}
-
-/// A point in the frame.
-fn checked_point(at: [f64; 2], (width, height): (usize, usize)) -> Result<[f64; 2]> {
-    // Pixels reach half a pixel beyond their centres.
-    let inside = |at: f64, length: usize| at >= -0.5 && at < length as f64 - 0.5;
-    if inside(at[0], width) && inside(at[1], height) {
-        return Ok(at);
-    }
-    let expected = format!("a point (x, y) in the {width} x {height} frame");
-    Err(Error::argument("center", expected, format!("({}, {})", at[0], at[1])))
-}
-
-/// The first frame must be usable.
-fn check_frame(frame: &Frame<f64>) -> Result<()> {
-    let (width, height) = frame.size();
-    if width < LEAST_FRAME || height < LEAST_FRAME {
-        let expected = format!("a frame of at least {LEAST_FRAME} x {LEAST_FRAME} px");
-        return Err(Error::argument("frame", expected, format!("{width} x {height}")));
-    }
-    if !all_finite(frame) {
-        return Err(Error::argument("frame", "finite samples in the first frame", "NaN or infinity"));
-    }
-    if let Some(sample) = frame.data().iter().find(|sample| sample.abs() > GREATEST) {
-        let expected = format!("samples of at most {GREATEST:e} grey levels in the first frame");
-        return Err(Error::argument("frame", expected, format!("{sample:e}")));
-    }
-    Ok(())
-}
-
-/// Whether a frame holds brightness, and nothing else.
-fn is_usable(frame: &Frame<f64>) -> bool {
-    // NaN is greater than nothing, and infinity greater than all.
-    let greatest = frame.data().iter().fold(0.0, |greatest: f64, sample| greatest.max(sample.abs()));
-    greatest <= GREATEST && all_finite(frame)
-}
-
-/// A box that holds something of the frame.
-fn checked_box(bounds: TargetBox, (width, height): (usize, usize)) -> Result<TargetBox> {
-    let TargetBox { x, y, width: w, height: h } = bounds;
-    let told = || format!("x {x}, y {y}, width {w}, height {h}");
-    if ![x, y, w, h].iter().all(|value| value.is_finite()) || w < LEAST_BOX || h < LEAST_BOX {
-        return Err(Error::argument(
-            "bbox",
-            format!("finite (x, y, width, height), sides of at least {LEAST_BOX} px"),
-            told(),
-        ));
-    }
-    if w > LARGEST_BOX * width as f64 || h > LARGEST_BOX * height as f64 {
-        let expected = format!("a box at most {LARGEST_BOX} times as large as the {width} x {height} frame");
-        return Err(Error::argument("bbox", expected, told()));
-    }
-    // Pixels reach half a pixel beyond their centres.
-    let apart = |from: f64, length: f64, whole: usize| from + length <= -0.5 || from >= whole as f64 - 0.5;
-    if apart(x, w, width) || apart(y, h, height) {
-        return Err(Error::argument(
-            "bbox",
-            format!("a box that holds something of the {width} x {height} frame"),
-            told(),
-        ));
-    }
-    Ok(bounds)
 }
 
 impl Tracker for GradientTracker {
@@ -210,20 +132,24 @@ impl Tracker for GradientTracker {
 
     fn update(&mut self, frame: &Frame<f64>) -> Result<TrackState> {
         if frame.size() != self.size {
-            let told = |(width, height): (usize, usize)| format!("{width} x {height} px");
-            return Err(Error::argument(
-                "frame",
-                format!("as large as the first, {}", told(self.size)),
-                told(frame.size()),
-            ));
+            let size = |(width, height): (usize, usize)| format!("{width} x {height} px");
+            let expected = format!("as large as the first, {}", size(self.size));
+            return Err(Error::argument("frame", expected, size(frame.size())));
         }
-        let usable = is_usable(frame);
+        let usable = start::is_usable(frame).then_some(frame);
         self.state.frame += 1;
         match &mut self.engine {
-            Engine::Waiting(..) if usable => self.wait(frame),
-            Engine::Waiting(..) => {}
-            Engine::Local(engine) => engine.update(usable.then_some(frame), &mut self.state),
-            Engine::Layered(engine) => engine.update(usable.then_some(frame), &mut self.state),
+            Engine::Waiting(waiting) => {
+                let found = usable.and_then(|frame| Some((frame, waiting.find(frame, self.method.camera())?)));
+                if let Some((frame, bounds)) = found {
+                    let (state, engine) = self.method.begin(frame, bounds);
+                    self.state = TrackState { frame: self.state.frame, reason: "the first object that moves", ..state };
+                    self.engine = engine;
+                }
+            }
+            Engine::Layered(state) => layered::update(state, usable, &mut self.state),
+            #[cfg(feature = "reference")]
+            Engine::Local(engine) => engine.update(usable, &mut self.state),
         }
         Ok(self.state.clone())
     }

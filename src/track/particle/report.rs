@@ -154,7 +154,6 @@ fn state_of(
         rotation_observable: false,
         visibility: if usual > 0.0 { (target.similarity / usual).min(1.0) } else { 0.0 },
         gain: unknown,
-        flow_count: 0,
         ..TrackState::at([x, y], TargetBox::about([x, y], w, h))
     }
 }

@@ -3,9 +3,7 @@
 //!
 //! `C(xi) = g a(xi) T(xi) + (1 - a(xi)) Bg(W(xi))`.
 
-use super::margin::Margin;
-use super::nodes::Places;
-use super::patch::{Patch, bounds_about};
+use super::patch::{Patch, Places, bounds_about, wide};
 use super::pose::Pose;
 use crate::image::{cubic_at, fill_holes};
 use crate::types::{Frame, TargetBox};
@@ -27,6 +25,9 @@ const BELIEVED: f64 = 0.2;
 /// Support that distances are counted from.
 const EDGE: f64 = 0.1;
 
+/// Weight of the first support, grey^2.
+pub(super) const PRIOR: f64 = 144.0;
+
 /// The target.
 #[derive(Debug, Clone)]
 pub(super) struct Target {
@@ -43,8 +44,6 @@ pub(super) struct Target {
     /// How much of what is seen next of a point becomes its brightness, where that was hidden at first; 0
     /// where it was seen.
     pub fresh: Option<Frame<f64>>,
-    /// How far the points of the box differ from what is behind them, until that is told.
-    pub margin: Option<Margin>,
     /// Sides at first, px.
     pub size: [f64; 2],
 }
@@ -65,7 +64,6 @@ impl Target {
         });
         Self {
             a: prior.clone(),
-            margin: Some(Margin::new(t.clone())),
             t,
             n: prior.map(|a| prior_weight * a),
             d: prior.map(|_| prior_weight),
@@ -115,7 +113,13 @@ impl Target {
             })
             .into_iter()
             .zip(self.size)
-            .map(|(extent, first)| if (extent / first - 1.0).abs() < BELIEVED { first } else { extent })
+            .map(|(extent, first)| {
+                if crate::ablation::keeps("gradient.first_extent") && (extent / first - 1.0).abs() < BELIEVED {
+                    first
+                } else {
+                    extent
+                }
+            })
             .collect::<Vec<_>>()
             .try_into()
             .unwrap_or(self.size)
@@ -135,11 +139,6 @@ impl Target {
         let (width, height) = self.a.size();
         Places::of(pose, (0..height).flat_map(|j| (0..width).map(move |i| self.xi(i, j))))
     }
-}
-
-/// Indices no farther than `reach` from one, of `length`.
-pub(super) fn wide(at: usize, reach: usize, length: usize) -> std::ops::Range<usize> {
-    at.saturating_sub(reach)..(at + reach + 1).min(length)
 }
 
 /// Whether a place is in the picture.
@@ -165,7 +164,7 @@ impl Background {
         let hidden = grown(bounds, UNSEEN);
         let known = Frame::from_fn(frame.width(), frame.height(), |x, y| !holds(&hidden, x, y));
         let mut this = Self { picture: frame.clone(), known, spare: Vec::new() };
-        let inside = grown(bounds, (0.0, BESIDE));
+        let inside = if crate::ablation::keeps("gradient.beside") { grown(bounds, (0.0, BESIDE)) } else { hidden };
         this.guess(&hidden, |x, y| !holds(&inside, x, y));
         this
     }
@@ -209,10 +208,15 @@ pub(super) fn grown(bounds: TargetBox, (share, more): (f64, f64)) -> TargetBox {
     )
 }
 
+/// Whether a place is in a box.
+pub(super) fn contains(bounds: &TargetBox, [x, y]: [f64; 2]) -> bool {
+    let within = |at: f64, from: f64, length: f64| (from..=from + length).contains(&at);
+    within(x, bounds.x, bounds.width) && within(y, bounds.y, bounds.height)
+}
+
 /// Whether a pixel's centre is in a box.
 pub(super) fn holds(bounds: &TargetBox, x: usize, y: usize) -> bool {
-    let within = |at: usize, from: f64, length: f64| (from..=from + length).contains(&(at as f64));
-    within(x, bounds.x, bounds.width) && within(y, bounds.y, bounds.height)
+    contains(bounds, [x as f64, y as f64])
 }
 
 #[cfg(test)]

@@ -1,21 +1,15 @@
 //! What is learnt from a frame in which the target was seen well.
 
-use super::layers::{Background, Target};
-use super::level::dilated;
-use super::look::View;
-use super::patch::smooth_known;
-use super::slanted::Slanted;
+use super::layers::{Background, PRIOR, Target};
+use super::patch::{dilated, smooth_known};
+use super::score::View;
+use super::state::LEAST_NOISE;
 use crate::math::robust_std;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
-use crate::types::Frame;
+use crate::types::{Frame, TargetBox};
 
 /// Memory of the support.
 const FORGETTING: f64 = 0.95;
-/// Weight of the first support, grey^2.
-pub(super) const PRIOR: f64 = 144.0;
-/// The same over the variance of the noise, where that is more: what noise alone says of the support stays
-/// small beside it.
-const PRIOR_IN_NOISE: f64 = 30.0;
 /// Rate of the template.
 const TEMPLATE_RATE: f64 = 0.08;
 /// Rate of the background.
@@ -26,8 +20,6 @@ const SUDDEN_STEP: f64 = 1.5;
 pub(super) const SOLID: f64 = 0.9;
 /// Width of that continuation, px of the target.
 pub(super) const CONTINUED: f64 = 2.0;
-/// Least noise, grey levels.
-pub(super) const LEAST_NOISE: f64 = 1.5;
 /// How much of the noise's last measurement is taken.
 const NOISE_RATE: f64 = 0.1;
 /// Pixels that the noise is measured on, at most.
@@ -48,7 +40,9 @@ pub(super) fn learn_target(target: &mut Target, view: &View, gain: f64, noise: f
         let step = TEMPLATE_RATE * a * off / (1.0 + (off / (6.0 * noise + 10.0)).powi(2));
         target.t.data_mut()[at] = (target.t.data()[at] + step / gain.max(0.1)) * gain;
     }
-    continue_template(target);
+    if crate::ablation::keeps("gradient.continue_template") {
+        continue_template(target);
+    }
 }
 
 /// Brightness of points that were hidden at first: the mean of what is seen of them, and not of what hides
@@ -81,11 +75,11 @@ fn learn_support(target: &mut Target, at: usize, (seen, behind, bright): (f64, f
     let least = 4.0 * noise + 6.0;
     let between = (seen - bright) * (seen - behind) <= 0.0;
     let explained = between || (seen - bright).abs() < least || (seen - behind).abs() < least;
-    if behind.is_nan() || !explained {
+    if behind.is_nan() || !explained && crate::ablation::keeps("gradient.explained") {
         return;
     }
     let contrast = bright - behind;
-    let prior = (1.0 - FORGETTING) * PRIOR.max(PRIOR_IN_NOISE * noise * noise);
+    let prior = (1.0 - FORGETTING) * PRIOR;
     let n = FORGETTING * target.n.data()[at] + contrast * (seen - behind) + prior * target.prior.data()[at];
     let d = FORGETTING * target.d.data()[at] + contrast * contrast + prior;
     (target.n.data_mut()[at], target.d.data_mut()[at]) = (n, d);
@@ -106,12 +100,12 @@ fn continue_template(target: &mut Target) {
     }
 }
 
-/// The background outside the box of the target, which is turned with it.
-pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, hidden: &Slanted, noise: f64) {
+/// The background outside the box of the target.
+pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, hidden: &TargetBox, noise: f64) {
     let sudden = 6.0 * noise + 8.0;
     let (width, height) = frame.size();
     for y in 0..height {
-        let [first, end] = hidden.columns(y, width);
+        let [first, end] = columns(hidden, y, width);
         let parts = if first < end { [0..first, end..width] } else { [0..width, width..width] };
         for part in parts {
             let seen = &frame.row(y)[part.clone()];
@@ -121,6 +115,15 @@ pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, 
             known.fill(true);
         }
     }
+}
+
+/// Columns of a row of pixels that a box holds: the first, and the one after the last.
+fn columns(bounds: &TargetBox, y: usize, width: usize) -> [usize; 2] {
+    if !(bounds.y..=bounds.y + bounds.height).contains(&(y as f64)) {
+        return [0, 0];
+    }
+    let pixel = |at: f64| at.clamp(0.0, width as f64) as usize;
+    [pixel(bounds.x.ceil()), pixel((bounds.x + bounds.width).floor() + 1.0)]
 }
 
 /// The step of the background at a row of pixels.
@@ -141,10 +144,11 @@ impl Kernel<f64> for Behind<'_> {
             let unknown = self.picture.iter_mut().zip(self.seen).zip(self.known).filter(|(_, known)| !**known);
             unknown.for_each(|((b, e), _)| *b = *e);
         }
+        let sudden_rule = crate::ablation::keeps("gradient.sudden_background");
         for (b, e) in self.picture.iter_mut().zip(self.seen) {
             let off = e - *b;
             let step = BACKGROUND_RATE * off;
-            let careful = step.clamp(-SUDDEN_STEP, SUDDEN_STEP);
+            let careful = if sudden_rule { step.clamp(-SUDDEN_STEP, SUDDEN_STEP) } else { step };
             *b += if off.abs() > self.sudden { careful } else { step };
         }
     }

@@ -1,12 +1,11 @@
 //! One level of the alignment: picture, background and target smoothed alike, and what the nodes of the
 //! target say there.
 
-use super::align::{Silence, Task};
-use super::layers::{is_inside, wide};
-use super::nodes::Places;
-use super::patch::{Patch, bounds_about, smooth};
+use super::layers::is_inside;
+use super::patch::{Patch, Places, bounds_about, dilated, smooth};
 use super::pose::Pose;
-use crate::track::gradient::local_flow::median;
+use super::task::{Task, Vote, VoteMask};
+use crate::track::gradient::noise::median;
 use crate::types::Frame;
 
 /// Longest step, px.
@@ -32,14 +31,6 @@ struct Node {
     /// Their derivatives by `xi`.
     slope_of_a: [f64; 2],
     slope_of_bright: [f64; 2],
-}
-
-/// A vote of a node.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Vote {
-    pub residual: f64,
-    pub weight: f64,
-    pub columns: [f64; 6],
 }
 
 /// What is read at the nodes; memory that steps share.
@@ -91,7 +82,7 @@ impl<'a> Level<'a> {
     pub fn vote(&mut self, pose: &Pose, gain: f64, silent: Option<&Frame<bool>>) -> f64 {
         self.read(pose);
         self.votes.clear();
-        let Task { frame, background, freedom, .. } = self.task;
+        let Task { frame, background, motion_model, .. } = self.task;
         let mut range = (f64::INFINITY, f64::NEG_INFINITY);
         for (k, node) in self.nodes.iter().enumerate() {
             let place = self.readings.places.get(k);
@@ -104,7 +95,7 @@ impl<'a> Level<'a> {
             let weight = if background.is_known(place) { 1.0 } else { node.a.powi(4) };
             if weight > 0.0 && !silent.is_some_and(|silent| silent.get(node.at[0], node.at[1])) {
                 let gradient = [0, 1].map(|i| gain * node.slope_of_bright[i] - behind * node.slope_of_a[i]);
-                let columns = freedom.columns(gradient, node.xi);
+                let columns = motion_model.columns(gradient, node.xi);
                 self.votes.push(Vote { residual: seen - model, weight, columns });
             }
         }
@@ -114,12 +105,12 @@ impl<'a> Level<'a> {
     /// Points without a vote, and those so near to them that smoothing mixes them: beside what covers the
     /// target its support ends without the target ending.
     pub fn silent(&self, pose: &Pose, gain: f64) -> Option<Frame<bool>> {
-        let Task { frame, target, silence, front, .. } = self.task;
-        if silence == Silence::None {
+        let Task { frame, target, vote_mask, .. } = self.task;
+        if vote_mask == VoteMask::None {
             return None;
         }
         let (width, height) = target.a.size();
-        if let Silence::Towards([dx, dy]) = silence {
+        if let VoteMask::Towards([dx, dy]) = vote_mask {
             let lies_there = |xi: [f64; 2]| {
                 let [x, y] = pose.turn(xi);
                 x * dx + y * dy > 0.0
@@ -136,28 +127,25 @@ impl<'a> Level<'a> {
                 return false;
             }
             let nearer_behind = (seen[at] - behind[at]).abs() < (seen[at] - gain * target.t.get(i, j)).abs();
-            match silence {
-                Silence::None | Silence::Towards(_) => false,
-                Silence::Covered => target.a.get(i, j) > SOLID && nearer_behind,
-                Silence::Front => {
-                    target.a.get(i, j) > SOLID
-                        && nearer_behind
-                        && front.is_some_and(|front| front.is_at(places.get(at)))
-                }
-                Silence::Lookalike if target.a.get(i, j) > SOLID => nearer_behind,
-                Silence::Lookalike => !nearer_behind,
+            match vote_mask {
+                VoteMask::None | VoteMask::Towards(_) => false,
+                VoteMask::Occluded => target.a.get(i, j) > SOLID && nearer_behind,
+                VoteMask::LookAlike if target.a.get(i, j) > SOLID => nearer_behind,
+                VoteMask::LookAlike => !nearer_behind,
             }
         });
+        if !crate::ablation::keeps("gradient.dilated_mask") {
+            return Some(silent);
+        }
         Some(dilated(&silent, 1 + self.sigma.ceil() as usize))
     }
 
-    /// Ratio of what is seen to the template, but for points that are `silent`.
-    pub fn gain(&mut self, pose: &Pose, before: f64, silent: Option<&Frame<bool>>) -> f64 {
+    /// Ratio of what is seen to the template.
+    pub fn gain(&mut self, pose: &Pose, before: f64) -> f64 {
         self.read(pose);
         let Task { frame, target, .. } = self.task;
         let Readings { places, seen, behind } = &self.readings;
-        let heard = |[i, j]: [usize; 2]| !silent.is_some_and(|silent| silent.get(i, j));
-        let solid = |node: &Node| target.a.get(node.at[0], node.at[1]) > BRIGHT && node.bright > 1.0 && heard(node.at);
+        let solid = |node: &Node| target.a.get(node.at[0], node.at[1]) > BRIGHT && node.bright > 1.0;
         let nodes = self.nodes.iter().enumerate();
         let mut ratios: Vec<f64> = nodes
             .filter(|(k, node)| solid(node) && is_inside(places.get(*k), frame))
@@ -195,11 +183,4 @@ fn nodes(task: &Task<'_>, near: &Frame<bool>, sigma: f64) -> Vec<Node> {
         }
     }
     nodes
-}
-
-/// Everything within `reach` points along both axes.
-pub(super) fn dilated(mask: &Frame<bool>, reach: usize) -> Frame<bool> {
-    let (width, height) = mask.size();
-    let along = Frame::from_fn(width, height, |i, j| mask.row(j)[wide(i, reach, width)].contains(&true));
-    Frame::from_fn(width, height, |i, j| wide(j, reach, height).any(|k| along.get(i, k)))
 }

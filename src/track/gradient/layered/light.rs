@@ -1,8 +1,8 @@
 //! What brightens the whole picture: the light, and a camera's black level.
 
-use super::camera::{AROUND, CAP, LESS, spread};
 use super::layers::{Background, grown};
-use crate::track::gradient::local_flow::median;
+use super::samples::{AROUND, CAP, LESS, spread};
+use crate::track::gradient::noise::median;
 use crate::types::{Frame, TargetBox};
 
 /// Pixels that the light is told from, at most.
@@ -45,10 +45,18 @@ pub(super) fn light(frame: &Frame<f64>, background: &Background, target: TargetB
     let gain = median(&mut ratios);
     let possible = (0.1..10.0).contains(&gain) && (gain - 1.0).abs() >= LEAST_LIGHT;
     let brighter = Light { gain, ..Light::USUAL };
-    let found = if possible && better(brighter, Light::USUAL) { brighter } else { Light::USUAL };
+    let found = if crate::ablation::keeps("gradient.light_gain") && possible && better(brighter, Light::USUAL) {
+        brighter
+    } else {
+        Light::USUAL
+    };
     let mut differences: Vec<f64> = pairs.iter().map(|[e, b]| e - b).collect();
     let jumped = Light { offset: median(&mut differences), ..Light::USUAL };
-    if jumped.offset.abs() > JUMP && better(jumped, found) { jumped } else { found }
+    if crate::ablation::keeps("gradient.light_offset") && jumped.offset.abs() > JUMP && better(jumped, found) {
+        jumped
+    } else {
+        found
+    }
 }
 
 #[cfg(test)]

@@ -3,8 +3,8 @@
 //! Two planes pass a camera at two speeds. What most of the picture does, or the mean of both, says nothing
 //! of the background that the target is before, whose texture would be taken for the target's.
 
-use super::camera::{AROUND, LESS, SAME, Samples};
 use super::layers::{grown, holds};
+use super::samples::{AROUND, LESS, SAME, Samples};
 use crate::types::{Frame, TargetBox};
 
 /// Farthest from the target, px.

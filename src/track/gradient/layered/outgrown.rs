@@ -4,8 +4,8 @@
 //! first frames that move, what moves is therefore looked for without the box ([`detect_moving_target`]);
 //! where it is larger than the box on all sides, and what lies between moved with it, it is the target.
 
+use super::initial::{Changes, InitialSegmentation};
 use super::layers::holds;
-use super::outset::{Changes, Outset};
 use crate::track::gradient::detect::{MovingTarget, detect_moving_target};
 use crate::types::{Frame, TargetBox};
 
@@ -20,7 +20,7 @@ const LINE: (f64, f64) = (0.2, 3.0);
 /// Share of what lies between the two that may not have moved with the target.
 const STRAYS: f64 = 0.15;
 
-impl Outset {
+impl InitialSegmentation {
     /// What moved, where the box holds only the middle of it: its outline goes on beyond the box on all
     /// sides, and what is between moved with it.
     pub fn outgrown(&self, frame: &Frame<f64>, noise: f64) -> Option<MovingTarget> {

@@ -1,7 +1,8 @@
-//! Parts of a picture, smoothed, and read between the pixels.
+//! Parts of a picture, smoothed, and read between the pixels; masks.
 
-use super::nodes::Places;
-use crate::image::{Border, GaussianSmoother, all_finite};
+use super::pose::Pose;
+use crate::image::{Border, GaussianSmoother, all_finite, cubic_at_all};
+use crate::simd::Level;
 use crate::types::Frame;
 
 /// Where Gaussians are cut off, standard deviations.
@@ -68,6 +69,60 @@ pub(super) fn smooth_known(frame: &Frame<f64>, sigma: f64) -> Frame<f64> {
     let data = value.data().iter().zip(share.data());
     let data = data.map(|(v, s)| if *s < LEAST_SHARE { f64::NAN } else { v / s }).collect();
     Frame::new(frame.width(), frame.height(), data).unwrap_or_default()
+}
+
+/// Points of the picture, px.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Places {
+    pub x: Vec<f64>,
+    pub y: Vec<f64>,
+}
+
+impl Places {
+    /// Where a pose brings points of the target.
+    pub fn of(pose: &Pose, points: impl Iterator<Item = [f64; 2]>) -> Self {
+        let mut this = Self::default();
+        this.refill(pose, points);
+        this
+    }
+
+    /// The same in the same memory.
+    pub fn refill(&mut self, pose: &Pose, points: impl Iterator<Item = [f64; 2]>) {
+        self.x.clear();
+        self.y.clear();
+        for xi in points {
+            let [x, y] = pose.apply(xi);
+            self.x.push(x);
+            self.y.push(y);
+        }
+    }
+
+    /// One of them.
+    #[inline(always)]
+    pub fn get(&self, at: usize) -> [f64; 2] {
+        [self.x[at], self.y[at]]
+    }
+
+    /// Brightness at all of them, by cubic convolution; beyond the border its pixels go on.
+    pub fn read(&self, frame: &Frame<f64>, origin: [f64; 2], out: &mut Vec<f64>) {
+        out.clear();
+        out.resize(self.x.len(), f64::NAN);
+        if !frame.data().is_empty() {
+            cubic_at_all(Level::detect(), frame, origin, (&self.x, &self.y), out);
+        }
+    }
+}
+
+/// Indices no farther than `reach` from one, of `length`.
+pub(super) fn wide(at: usize, reach: usize, length: usize) -> std::ops::Range<usize> {
+    at.saturating_sub(reach)..(at + reach + 1).min(length)
+}
+
+/// Everything within `reach` points along both axes.
+pub(super) fn dilated(mask: &Frame<bool>, reach: usize) -> Frame<bool> {
+    let (width, height) = mask.size();
+    let along = Frame::from_fn(width, height, |i, j| mask.row(j)[wide(i, reach, width)].contains(&true));
+    Frame::from_fn(width, height, |i, j| wide(j, reach, height).any(|k| along.get(i, k)))
 }
 
 #[cfg(test)]

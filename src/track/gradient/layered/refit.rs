@@ -4,8 +4,8 @@
 //! it has clearly other sides than the box, what the box holds besides stayed where it was and does not look
 //! like the target, and what the box leaves out moved along, it is the target.
 
+use super::initial::{Changes, InitialSegmentation};
 use super::layers::{grown, holds};
-use super::outset::{Changes, Outset};
 use crate::track::gradient::detect::{MovingTarget, detect_moving_target};
 use crate::types::{Frame, TargetBox};
 
@@ -42,7 +42,7 @@ const FEWEST: usize = 12;
 /// The 10th and the 90th percentile of a part's brightness: its usual range.
 const USUAL: [f64; 2] = [0.1, 0.9];
 
-impl Outset {
+impl InitialSegmentation {
     /// What moved, where that has clearly other sides than the box.
     pub fn refitted(&self, frame: &Frame<f64>, noise: f64) -> Option<MovingTarget> {
         // Where what the box holds tells its displacement, that spares looking in vain.
@@ -150,8 +150,8 @@ impl Changes<'_> {
 mod tests {
     use super::*;
     use crate::math::random::CounterRng;
+    use crate::track::gradient::layered::layers::PRIOR;
     use crate::track::gradient::layered::layers::Target;
-    use crate::track::gradient::layered::learn::PRIOR;
 
     const SIDE: usize = 14;
     const NOISE: f64 = 1.5;
@@ -177,7 +177,7 @@ mod tests {
 
     fn told(bounds: TargetBox, moved: [usize; 2], hidden_to: usize, level: f64) -> Option<TargetBox> {
         let first = scene([0; 2], hidden_to, level, 1);
-        let outset = Outset::new(&first, bounds, Target::new(&first, bounds, PRIOR));
+        let outset = InitialSegmentation::new(&first, bounds, Target::new(&first, bounds, PRIOR));
         outset.refitted(&scene(moved, hidden_to, level, 2), NOISE).map(|found| found.bounds)
     }
 

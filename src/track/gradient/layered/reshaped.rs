@@ -6,9 +6,9 @@
 //! What looks like the target goes on beyond its outline then. Where an affine map from the expected pose
 //! explains nearly all of it, that is the pose; from there on similarities are tried again.
 
-use super::align::{Freedom, Silence};
-use super::find::{DOUBT, DROP, Finding, LEAK, PRIOR, WELL};
-use super::{Layered, SURE};
+use super::finding::{DOUBT, DROP, Finding, LEAK, PRIOR, SURE, WELL, try_at};
+use super::state::State;
+use super::task::{MotionModel, VoteMask};
 use crate::types::Frame;
 
 /// Part of the target's area in which its support is not what the picture tells, from which on its outline is
@@ -24,24 +24,22 @@ const BETTER: f64 = 0.8;
 /// Least size over that of the frame before: what shrinks faster is covered.
 const SHRUNK: f64 = 0.95;
 
-impl Layered {
-    /// The target under an affine map, where that explains an outline that a similarity, `plain`, does not.
-    pub(super) fn reshaped(&self, frame: &Frame<f64>, plain: &Finding, levels: &[f64]) -> Option<Finding> {
-        let [width, height] = self.target.extent();
-        let doubted = plain.look.mismatch > OFF * width * height && plain.look.leak > BEYOND;
-        // Of what comes out again, the rest is hidden still.
-        let returns = self.missed > 0 || self.returning > 0;
-        if self.freedom != Freedom::Similarity || returns || !doubted {
-            return None;
-        }
-        let guess = self.expected(!self.hidden);
-        let mut found = self.try_at(frame, &guess, (Freedom::Affine, Silence::None, PRIOR, levels))?;
-        // Which way a stretched outline is turned is told by the similarity, if at all.
-        found.aligned.rotation_told = plain.aligned.rotation_told;
-        let farthest = if plain.look.one_sided < ASIDE { DOUBT } else { SURE };
-        let expected = found.nis < farthest && found.aligned.pose.scale() > SHRUNK * self.pose.scale();
-        let seen = found.look.visibility >= WELL && found.look.visibility > plain.look.visibility - DROP;
-        let explained = found.look.leak < LEAK && found.look.mismatch < BETTER * plain.look.mismatch;
-        (expected && seen && explained).then_some(found)
+/// The target under an affine map, where that explains an outline that a similarity, `plain`, does not.
+pub(super) fn locate_reshaped(state: &State, frame: &Frame<f64>, plain: &Finding, levels: &[f64]) -> Option<Finding> {
+    let [width, height] = state.target.extent();
+    let doubted = plain.score.mismatch > OFF * width * height && plain.score.leak > BEYOND;
+    // Of what comes out again, the rest is hidden still.
+    let returns = state.history.missed > 0 || state.history.reappearing > 0;
+    if state.motion_model != MotionModel::Similarity || returns || !doubted {
+        return None;
     }
+    let guess = state.expected();
+    let mut found = try_at(state, frame, &guess, (MotionModel::Affine, VoteMask::None, PRIOR, levels))?;
+    // Which way a stretched outline is turned is told by the similarity, if at all.
+    found.aligned.rotation_observable = plain.aligned.rotation_observable;
+    let farthest = if plain.score.one_sided < ASIDE { DOUBT } else { SURE };
+    let expected = found.nis < farthest && found.aligned.pose.scale() > SHRUNK * state.motion.pose.scale();
+    let seen = found.score.visibility >= WELL && found.score.visibility > plain.score.visibility - DROP;
+    let explained = found.score.leak < LEAK && found.score.mismatch < BETTER * plain.score.mismatch;
+    (expected && seen && explained).then_some(found)
 }

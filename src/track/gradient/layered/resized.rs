@@ -5,15 +5,15 @@
 //! that looks like cover again: the two keep each other up. What really covers a target lets a part of its
 //! outline be seen; a target of another size fits all around, and leaves nothing of itself beside it.
 
-use super::Layered;
-use super::align::{Aligned, Silence};
-use super::camera::CAP;
-use super::find::{DROP, Finding, LEVELS, PRIOR, WELL};
-use super::layers::{CORE, grown};
-use super::look::{Look, is_hit, view};
+use super::alignment::Alignment;
+use super::finding::{DROP, Finding, LEVELS, PRIOR, RESIZED, WELL, try_at};
+use super::layers::{CORE, contains, grown};
 use super::pose::Pose;
-use super::search;
-use super::slanted::Slanted;
+use super::samples::CAP;
+use super::score::{Score, is_hit, view};
+use super::search::search;
+use super::state::State;
+use super::task::VoteMask;
 use crate::types::{Frame, TargetBox};
 
 /// Frames in a row after which cover is doubted.
@@ -29,83 +29,82 @@ const EVERY: usize = 2;
 const REACH: usize = 12;
 /// What a part of the target that is not seen counts as, grey levels.
 const UNSEEN: f64 = 6.0;
-/// What is said of it.
-pub(super) const RESIZED: &str = "what seemed to cover the target was a change of its size";
 
-impl Layered {
-    /// The target at another size than the one held, where it is seen well and explains the picture better
-    /// than cover does. One size at a time, in turn, which bounds the time of a covered frame.
-    pub(super) fn resized(&self, frame: &Frame<f64>, covered: &Finding) -> Option<Finding> {
-        if self.covered < LONG || !(self.covered - LONG).is_multiple_of(EVERY) {
-            return None;
+/// The target at another size than the one held, where it is seen well and explains the picture better
+/// than cover does. One size at a time, in turn, which bounds the time of a covered frame.
+pub(super) fn locate_resized(state: &State, frame: &Frame<f64>, covered: &Finding) -> Option<Finding> {
+    if state.history.occluded_frames < LONG || !(state.history.occluded_frames - LONG).is_multiple_of(EVERY) {
+        return None;
+    }
+    let expected = covered.aligned.pose;
+    let size = SIZES[(state.history.occluded_frames - LONG) / EVERY % SIZES.len()];
+    let guess =
+        state.placed(Pose { a: expected.a.map(|row| row.map(|a| size * a)), ..expected }, state.position(&expected));
+    let place = search(frame, &state.target, &state.background, (&guess, 1.0), REACH)?;
+    let found = try_at(state, frame, &place, (state.motion_model, VoteMask::None, PRIOR, &LEVELS[1..]))?;
+    let around = grown(state.reached(&expected), (0.2, REACH as f64));
+    let [left, before] = [&found, covered].map(|finding| unexplained(state, frame, finding, &around));
+    let taken =
+        left < before && fits(&found.score, &covered.score) && left_over(state, frame, covered, &found) < FRINGE;
+    taken.then_some(Finding { reason: RESIZED, ..found })
+}
+
+/// What target and background together leave unexplained of a part of the picture, large differences
+/// counting alike; grey levels. Of a covered target any part may be hidden.
+pub(super) fn unexplained(state: &State, frame: &Frame<f64>, found: &Finding, around: &TargetBox) -> f64 {
+    let Alignment { pose, gain, .. } = found.aligned;
+    let [[a, b], [c, d]] = pose.a;
+    let determinant = a * d - b * c;
+    let (columns, rows) = (state.target.half()[0], state.target.half()[1]);
+    let [low, high] = pixels(around, frame.size());
+    let (mut sum, mut count) = (0.0, 0.0);
+    for y in low[1]..high[1] {
+        for x in low[0]..high[0] {
+            let [dx, dy] = [x as f64 - pose.p[0], y as f64 - pose.p[1]];
+            let [i, j] = [(d * dx - b * dy) / determinant + columns, (a * dy - c * dx) / determinant + rows];
+            let behind = state.background.picture.get(x, y);
+            let on = i >= 0.0 && j >= 0.0 && i <= 2.0 * columns && j <= 2.0 * rows;
+            let model = if on {
+                let at = [(i + 0.5) as usize, (j + 0.5) as usize];
+                let support = state.target.a.get(at[0], at[1]);
+                support * gain * state.target.t.get(at[0], at[1]) + (1.0 - support) * behind
+            } else {
+                behind
+            };
+            let seen = frame.get(x, y);
+            let hidden = if found.occluded { (seen - behind).abs() + UNSEEN } else { CAP };
+            sum += (seen - model).abs().min(hidden).min(CAP);
+            count += 1.0;
         }
-        let expected = covered.aligned.pose;
-        let size = SIZES[(self.covered - LONG) / EVERY % SIZES.len()];
-        let guess =
-            self.placed(Pose { a: expected.a.map(|row| row.map(|a| size * a)), ..expected }, self.position(&expected));
-        let place = search::search(frame, &self.target, &self.background, (&guess, 1.0), REACH)?;
-        let found = self.try_at(frame, &place, (self.freedom, Silence::None, PRIOR, &LEVELS[1..]))?;
-        let around = grown(self.reached(&expected), (0.2, REACH as f64));
-        let [left, before] = [&found, covered].map(|finding| self.unexplained(frame, finding, &around));
-        let taken =
-            left < before && fits(&found.look, &covered.look) && self.left_over(frame, covered, &found) < FRINGE;
-        taken.then_some(Finding { reason: RESIZED, ..found })
     }
+    sum / f64::max(count, 1.0)
+}
 
-    /// What target and background together leave unexplained of a part of the picture, large differences
-    /// counting alike; grey levels. Of a covered target any part may be hidden.
-    fn unexplained(&self, frame: &Frame<f64>, found: &Finding, around: &TargetBox) -> f64 {
-        let Aligned { pose, gain, .. } = found.aligned;
-        let [[a, b], [c, d]] = pose.a;
-        let determinant = a * d - b * c;
-        let (columns, rows) = (self.target.half()[0], self.target.half()[1]);
-        let [low, high] = pixels(around, frame.size());
-        let (mut sum, mut count) = (0.0, 0.0);
-        for y in low[1]..high[1] {
-            for x in low[0]..high[0] {
-                let [dx, dy] = [x as f64 - pose.p[0], y as f64 - pose.p[1]];
-                let [i, j] = [(d * dx - b * dy) / determinant + columns, (a * dy - c * dx) / determinant + rows];
-                let behind = self.background.picture.get(x, y);
-                let on = i >= 0.0 && j >= 0.0 && i <= 2.0 * columns && j <= 2.0 * rows;
-                let model = if on {
-                    let at = [(i + 0.5) as usize, (j + 0.5) as usize];
-                    let support = self.target.a.get(at[0], at[1]);
-                    support * gain * self.target.t.get(at[0], at[1]) + (1.0 - support) * behind
-                } else {
-                    behind
-                };
-                let seen = frame.get(x, y);
-                let hidden = if found.occluded { (seen - behind).abs() + UNSEEN } else { CAP };
-                sum += (seen - model).abs().min(hidden).min(CAP);
-                count += 1.0;
-            }
-        }
-        sum / f64::max(count, 1.0)
-    }
-
-    /// Area inside the outline that is held in which the target is seen, and which another size leaves out,
-    /// over the area of the target at that size. Between the bars of a fence a small target fits as well as a
-    /// part of a large one, but there is more of that between the next bars.
-    fn left_over(&self, frame: &Frame<f64>, held: &Finding, resized: &Finding) -> f64 {
-        let Aligned { pose, gain, .. } = held.aligned;
-        let other = resized.aligned.pose;
-        let sides = self.target.extent();
-        let outline = Slanted::about(self.position(&other), &other, sides, (0.0, 0.0));
-        let shown = view(frame, &self.target, &self.background, &pose);
-        let places = self.target.places(&pose);
-        let left_out = self.target.a.data().iter().zip(self.target.t.data()).enumerate().filter(|&(at, (&a, &t))| {
-            let (bright, behind) = (gain * t, shown.behind[at]);
-            let clear = (bright - behind).abs() > 4.0 * self.noise;
-            a > CORE && clear && is_hit(shown.seen[at], bright, behind, self.noise) && !outline.holds(places.get(at))
-        });
-        let growth = other.scale() / pose.scale();
-        left_out.count() as f64 / (sides[0] * sides[1] * growth * growth)
-    }
+/// Area inside the outline that is held in which the target is seen, and which another size leaves out,
+/// over the area of the target at that size. Between the bars of a fence a small target fits as well as a
+/// part of a large one, but there is more of that between the next bars.
+pub(super) fn left_over(state: &State, frame: &Frame<f64>, held: &Finding, resized: &Finding) -> f64 {
+    let Alignment { pose, gain, .. } = held.aligned;
+    let other = resized.aligned.pose;
+    let sides = state.target.extent();
+    let outline = state.upright(&other);
+    let shown = view(frame, &state.target, &state.background, &pose);
+    let places = state.target.places(&pose);
+    let left_out = state.target.a.data().iter().zip(state.target.t.data()).enumerate().filter(|&(at, (&a, &t))| {
+        let (bright, behind) = (gain * t, shown.behind[at]);
+        let clear = (bright - behind).abs() > 4.0 * state.scene.noise;
+        a > CORE
+            && clear
+            && is_hit(shown.seen[at], bright, behind, state.scene.noise)
+            && !contains(&outline, places.get(at))
+    });
+    let growth = other.scale() / pose.scale();
+    left_out.count() as f64 / (sides[0] * sides[1] * growth * growth)
 }
 
 /// Whether the target is seen well, better than with cover, and none of it beside the outline.
-fn fits(look: &Look, covered: &Look) -> bool {
-    look.visibility >= WELL && look.visibility > covered.visibility + DROP && look.leak < FRINGE
+fn fits(score: &Score, covered: &Score) -> bool {
+    score.visibility >= WELL && score.visibility > covered.visibility + DROP && score.leak < FRINGE
 }
 
 /// First pixel of a box that is in the picture, and the one after the last, along both axes.

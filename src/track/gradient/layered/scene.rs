@@ -1,13 +1,14 @@
 //! What a frame says of the still scene before the target is looked for: light, motion of the camera, and
 //! whether it is of that scene at all.
 
-use super::camera::{self, AROUND, SCATTER_SAMPLES, Seen, spread};
-use super::find::{DOUBT, Finding};
+use super::camera::{FramePyramid, camera_motion, scatter};
 use super::layers::grown;
+use super::learn;
 use super::light::Light;
-use super::{Layered, SURE, learn};
+use super::samples::{AROUND, SCATTER_SAMPLES, spread};
+use super::state::{LEAST_NOISE, State};
 use crate::math::robust_std;
-use crate::track::gradient::local_flow::median;
+use crate::track::gradient::noise::median;
 use crate::track::gradient::options::CameraMotion;
 use crate::types::{Frame, TargetBox};
 
@@ -20,102 +21,81 @@ const WILD_FOR: usize = 10;
 /// Contrast of the scene over that of the frame before, from which on down it is gone.
 const GONE: f64 = 0.25;
 
-impl Layered {
-    /// Whether nothing of the scene is left in a frame before anything was measured: black, or another even
-    /// picture. What noise there is, is learnt from the first pair, and would be all that such a frame
-    /// differs by, so that anything would look like the target. Even frames say nothing however many there
-    /// are.
-    pub(super) fn is_blank(&self, frame: &Frame<f64>) -> bool {
-        if self.age > 0 {
-            return false;
-        }
-        let even = |frame: &Frame<f64>| frame.data().windows(2).all(|pair| pair[0] == pair[1]);
-        if even(frame) {
-            return !even(&self.previous.frame);
-        }
-        let hidden = self.reached(&self.pose);
-        let [before, now] = [&self.previous.frame, frame].map(|frame| contrast(frame, hidden));
-        now < GONE * before && before > learn::LEAST_NOISE && self.gap <= WILD_FOR
+/// Whether nothing of the scene is left in a frame before anything was measured: black, or another even
+/// picture. What noise there is, is learnt from the first pair, and would be all that such a frame
+/// differs by, so that anything would look like the target. Even frames say nothing however many there
+/// are.
+pub(super) fn is_blank(state: &State, frame: &Frame<f64>) -> bool {
+    if state.history.age > 0 {
+        return false;
     }
+    let even = |frame: &Frame<f64>| frame.data().windows(2).all(|pair| pair[0] == pair[1]);
+    if even(frame) {
+        return !even(&state.scene.previous.frame);
+    }
+    let hidden = state.reached(&state.motion.pose);
+    let [before, now] = [&state.scene.previous.frame, frame].map(|frame| contrast(frame, hidden));
+    now < GONE * before && before > LEAST_NOISE && state.scene.gap <= WILD_FOR
+}
 
-    /// How far the scene moved since the last frame that said something.
-    pub(super) fn camera_motion(&self, seen: &Seen, bounds: TargetBox) -> [f64; 2] {
-        let expected = self.swung.map(|m| m * self.gap as f64);
-        match self.camera {
-            CameraMotion::Auto => camera::camera_motion(&self.previous, seen, bounds, self.noise, expected),
-            CameraMotion::None => [0.0; 2],
-        }
+/// How far the scene moved since the last frame that said something.
+pub(super) fn measure_camera_motion(state: &State, seen: &FramePyramid, bounds: TargetBox) -> [f64; 2] {
+    let expected = state.scene.camera_velocity.map(|m| m * state.scene.gap as f64);
+    match state.camera {
+        CameraMotion::Auto => camera_motion(&state.scene.previous, seen, bounds, state.scene.noise, expected),
+        CameraMotion::None => [0.0; 2],
     }
+}
 
-    /// Whether a frame has little to do with the one before: far too bright, or noise. Nothing can be learnt
-    /// from it, and the next one is compared with the last that was not so; unless there are so many of them
-    /// that this is how the scene looks now.
-    pub(super) fn is_wild(&mut self, frame: &Frame<f64>, bounds: TargetBox, motion: [f64; 2]) -> bool {
-        if self.age == 0 {
-            return false;
-        }
-        let scatter = camera::scatter(&self.previous.frame, frame, bounds, motion);
-        if scatter <= OUTLYING.0 * self.noise + OUTLYING.1 {
-            return false;
-        }
-        let lasts = self.gap > WILD_FOR;
-        if lasts {
-            // Differences have the noise of two frames.
-            self.noise = self.noise.max(scatter / std::f64::consts::SQRT_2);
-        }
-        !lasts
+/// Whether a frame has little to do with the one before: far too bright, or noise. Nothing can be learnt
+/// from it, and the next one is compared with the last that was not so; unless there are so many of them
+/// that this is how the scene looks now.
+pub(super) fn is_wild(state: &mut State, frame: &Frame<f64>, bounds: TargetBox, motion: [f64; 2]) -> bool {
+    if state.history.age == 0 {
+        return false;
     }
+    let changed = scatter(&state.scene.previous.frame, frame, bounds, motion);
+    if changed <= OUTLYING.0 * state.scene.noise + OUTLYING.1 {
+        return false;
+    }
+    let lasts = state.scene.gap > WILD_FOR;
+    if lasts {
+        // Differences have the noise of two frames.
+        state.scene.noise = state.scene.noise.max(changed / std::f64::consts::SQRT_2);
+    }
+    !lasts
+}
 
-    /// The frame, so bright as if the light were what it was at first.
-    pub(super) fn in_usual_light(&mut self, frame: &Frame<f64>, light: Light) -> Frame<f64> {
-        let mut data = std::mem::take(&mut self.spare);
-        data.clear();
-        if light == Light::USUAL {
-            data.extend_from_slice(frame.data());
-        } else {
-            data.extend(frame.data().iter().map(|value| light.undone(*value)));
-        }
-        Frame::new(frame.width(), frame.height(), data).unwrap_or_default()
+/// The frame, so bright as if the light were what it was at first.
+pub(super) fn normalize_light(state: &mut State, frame: &Frame<f64>, light: Light) -> Frame<f64> {
+    let mut data = std::mem::take(&mut state.scene.buffer);
+    data.clear();
+    if light == Light::USUAL {
+        data.extend_from_slice(frame.data());
+    } else {
+        data.extend(frame.data().iter().map(|value| light.undone(*value)));
     }
+    Frame::new(frame.width(), frame.height(), data).unwrap_or_default()
+}
 
-    pub(super) fn follow_camera(&mut self, motion: [f64; 2], frame: &Frame<f64>) {
-        if motion == [0.0; 2] {
-            self.noise = learn::learn_noise((self.age > 0).then_some(self.noise), &self.previous.frame, frame);
-            return;
-        }
-        self.background.moved(motion, frame);
-        self.shift(motion);
+pub(super) fn follow_camera(state: &mut State, motion: [f64; 2], frame: &Frame<f64>) {
+    if motion == [0.0; 2] {
+        state.scene.noise = learn::learn_noise(
+            (state.history.age > 0).then_some(state.scene.noise),
+            &state.scene.previous.frame,
+            frame,
+        );
+        return;
     }
+    state.background.moved(motion, frame);
+    shift(state, motion);
+}
 
-    /// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the
-    /// camera follows the target: where one of the two is doubtful, the other is tried.
-    pub(super) fn find_wherever_it_rides(&mut self, frame: &Frame<f64>, motion: [f64; 2]) -> Option<Finding> {
-        let against = motion.map(|m| -m);
-        if motion != [0.0; 2] && self.with_camera {
-            self.shift(against);
-        }
-        let first = self.find(frame);
-        let nis = |found: &Option<Finding>| found.map_or(f64::INFINITY, |f| if f.occluded { DOUBT } else { f.nis });
-        if motion == [0.0; 2] || nis(&first) < SURE {
-            return first;
-        }
-        let (there, back) = if self.with_camera { (motion, against) } else { (against, motion) };
-        self.shift(there);
-        let second = self.find(frame);
-        if nis(&second) < nis(&first) {
-            self.with_camera = !self.with_camera;
-            return second;
-        }
-        self.shift(back);
-        first
-    }
-
-    fn shift(&mut self, motion: [f64; 2]) {
-        self.filter.shift(motion);
-        let shifted = |at: [f64; 2]| [at[0] + motion[0], at[1] + motion[1]];
-        self.before = self.before.map(shifted);
-        self.pose.p = shifted(self.pose.p);
-    }
+pub(super) fn shift(state: &mut State, motion: [f64; 2]) {
+    state.motion.filter.shift(motion);
+    let shifted = |at: [f64; 2]| [at[0] + motion[0], at[1] + motion[1]];
+    state.motion.last_position = state.motion.last_position.map(shifted);
+    state.motion.pose.p = shifted(state.motion.pose.p);
 }
 
 /// Contrast of the still scene, grey levels: the deviation of its brightness from the median, robustly.

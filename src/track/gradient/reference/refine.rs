@@ -2,9 +2,10 @@
 
 use super::equations::Equations;
 use super::kernels::{REACH, kernels_of};
-use super::local_flow::{LocalFlow, LocalFlowOptions, median};
+use super::local_flow::{LocalFlow, LocalFlowOptions};
 use crate::image::Spline;
 use crate::simd::Level;
+use crate::track::gradient::noise::median;
 use crate::types::Frame;
 
 /// How flow is refined.

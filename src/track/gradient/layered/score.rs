@@ -22,7 +22,7 @@ pub(super) struct View {
 
 /// What a view amounts to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Look {
+pub(super) struct Score {
     /// Share of the target that is seen, weighed by its contrast.
     pub visibility: f64,
     /// Mean difference of the target from what is known or thought to be behind it, grey levels.
@@ -74,7 +74,7 @@ fn mismatch(a: f64, seen: f64, bright: f64, behind: f64, noise: f64) -> f64 {
 }
 
 /// Visibility, and look-alikes beside the target.
-pub(super) fn look(target: &Target, view: &View, gain: f64, noise: f64) -> Look {
+pub(super) fn score(target: &Target, view: &View, gain: f64, noise: f64) -> Score {
     let near = target.near();
     let (mut hit, mut all, mut area) = (0.0, 0.0, 0.0);
     let (mut difference, mut count) = (0.0, 0.0);
@@ -107,7 +107,7 @@ pub(super) fn look(target: &Target, view: &View, gain: f64, noise: f64) -> Look 
             lengths += xi[0].hypot(xi[1]);
         }
     }
-    Look {
+    Score {
         contrast: if count > 0.0 { difference / count } else { 0.0 },
         visibility: if all > 0.0 { hit / all } else { 0.0 },
         leak: if area > 0.0 { alike / area } else { 0.0 },

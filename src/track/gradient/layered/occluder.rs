@@ -1,6 +1,6 @@
 //! Which pixels of the first box are the target's, and which are of something still before it.
 
-use super::outset::Changes;
+use super::initial::{Changes, InitialSegmentation};
 use super::patch::smooth_known;
 use crate::math::robust_std;
 use crate::types::Frame;
@@ -29,8 +29,32 @@ const APART: f64 = 0.3;
 const STRAY: f64 = 0.02;
 /// Around the box, what is behind the target is told from, px.
 const AROUND: usize = 3;
+/// Displacement, px squared, beyond which what moves is told from what does not.
+const LEAST: isize = 2;
 /// Longest way between pixels, as one counts that differ only by noise.
 const FAR: f64 = 1e6;
+
+/// Part of the first box is something still before the target.
+#[derive(Debug)]
+pub(super) struct HiddenPart {
+    /// How far the target moved since the first frame, px.
+    pub moved: [f64; 2],
+    /// Frames since then.
+    pub frames: usize,
+    /// Pixels of the patch that are in the box and not the target's.
+    pub hidden: Frame<bool>,
+}
+
+/// Looks in the next frame for what hides part of the first box.
+pub(super) fn find_occluder(initial: &mut InitialSegmentation, frame: &Frame<f64>, noise: f64) -> Option<HiddenPart> {
+    initial.advance();
+    let changes = initial.changes(frame, noise);
+    let moved = changes.displacement()?;
+    let told = moved[0] * moved[0] + moved[1] * moved[1] > LEAST;
+    let hidden = if told && crate::ablation::keeps("gradient.start_occluder") { hidden(&changes, moved) } else { None };
+    initial.keep_displacement(moved);
+    hidden.map(|hidden| HiddenPart { moved: moved.map(|m| m as f64), frames: initial.frames(), hidden })
+}
 
 /// Pixels of the box that something still hides the target at; `None` without evidence for such a thing.
 ///
@@ -38,9 +62,9 @@ const FAR: f64 = 1e6;
 /// nor changed. What is on the target's side of that edge looks like what is known to move, on the other side
 /// it does not. A margin that is behind the target differs: there the target leaves what does not look like
 /// it.
-pub(super) fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<bool>> {
+fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<bool>> {
     let evidence = Evidence::of(changes, moved);
-    let look = TargetLook::of(changes, &evidence.moving)?;
+    let look = Appearance::of(changes, &evidence.moving)?;
     let fewest = EDGE * changes.outset.side() * ((moved[0] as f64).hypot(moved[1] as f64) - 1.0);
     let first = &changes.outset.first.frame;
     let (mut still, mut agreed) = (Vec::new(), 0);
@@ -144,13 +168,13 @@ fn unlike_all_around(changes: &Changes<'_>, [x, y]: [usize; 2], [i, j]: [usize; 
 }
 
 /// How the target looks, from what is known to move.
-struct TargetLook {
+struct Appearance {
     mean: Frame<f64>,
     scatter: f64,
     behind: f64,
 }
 
-impl TargetLook {
+impl Appearance {
     fn of(changes: &Changes<'_>, moving: &[[usize; 2]]) -> Option<Self> {
         let first = &changes.outset.first.frame;
         let (width, height) = first.size();
@@ -225,4 +249,72 @@ fn spread(changes: &Changes<'_>, moving: &[[usize; 2]], still: &[[usize; 2]]) ->
         }
     }
     hidden
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::random::CounterRng;
+    use crate::track::gradient::layered::layers::Target;
+    use crate::types::TargetBox;
+
+    const SIDE: usize = 20;
+
+    /// A square that was at (40, 30) at first, `moved` since, with what hides it up to a column, before
+    /// texture.
+    fn scene(moved: [usize; 2], hidden_to: usize, seed: u64) -> Frame<f64> {
+        let rng = CounterRng::new(seed);
+        Frame::from_fn(110, 80, |x, y| {
+            let target = (40 + moved[0]..40 + moved[0] + SIDE).contains(&x)
+                && (30 + moved[1]..30 + moved[1] + SIDE).contains(&y);
+            let behind = 90.0 + 20.0 * (0.3 * x as f64).sin() * (0.2 * y as f64).cos();
+            let brightness = match (x < hidden_to, target) {
+                (true, _) => 130.0,
+                (_, true) => 200.0,
+                _ => behind,
+            };
+            brightness + 1.5 * rng.normal((110 * y + x) as u64)
+        })
+    }
+
+    /// What is told when the square has moved once.
+    fn told(bounds: TargetBox, moved: [usize; 2], hidden_to: usize) -> Option<HiddenPart> {
+        let first = scene([0; 2], hidden_to, 1);
+        let mut outset = InitialSegmentation::new(&first, bounds, Target::new(&first, bounds, 144.0));
+        find_occluder(&mut outset, &scene(moved, hidden_to, 2), 1.5)
+    }
+
+    fn exact() -> TargetBox {
+        TargetBox { x: 39.5, y: 29.5, width: SIDE as f64, height: SIDE as f64 }
+    }
+
+    #[test]
+    fn what_hides_part_of_the_box_is_told_to_the_pixel() {
+        for hidden_to in [44, 50, 54] {
+            let found = told(exact(), [4, 1], hidden_to).unwrap();
+            assert_eq!((found.moved, found.frames), ([4.0, 1.0], 1));
+            let count = found.hidden.data().iter().filter(|hidden| **hidden).count();
+            assert_eq!(count, (hidden_to - 40) * SIDE, "{hidden_to}");
+        }
+    }
+
+    #[test]
+    fn a_target_that_nothing_hides_is_left_alone_whether_its_box_is_right_or_not() {
+        assert!(told(exact(), [4, 1], 0).is_none());
+        assert!(told(TargetBox { x: 35.5, y: 25.5, width: 28.0, height: 28.0 }, [4, 1], 0).is_none());
+        assert!(told(TargetBox { x: 43.5, y: 33.5, width: 12.0, height: 12.0 }, [4, 1], 0).is_none());
+        // What does not move tells nothing.
+        assert!(told(exact(), [0, 0], 50).is_none());
+    }
+
+    #[test]
+    fn waiting_ends() {
+        let first = scene([0; 2], 50, 1);
+        let mut outset = InitialSegmentation::new(&first, exact(), Target::new(&first, exact(), 144.0));
+        while outset.frames() < 12 {
+            assert!(!outset.is_over());
+            outset.skip();
+        }
+        assert!(outset.is_over());
+    }
 }

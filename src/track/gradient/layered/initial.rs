@@ -8,7 +8,6 @@
 
 use super::layers::{Target, holds};
 use super::patch::{Bounds, Patch, bounds_about};
-use super::segment;
 use crate::track::gradient::detect::half_a_pixel_around;
 use crate::types::{Frame, TargetBox};
 
@@ -18,8 +17,6 @@ const FRAMES: usize = 12;
 const FARTHEST: isize = 20;
 /// Farthest displacement from where it is expected, px: in the first step, and later.
 const REACH: [isize; 2] = [10, 5];
-/// Displacement, px squared, beyond which what moves is told from what does not.
-const LEAST: isize = 2;
 /// Change over the deviation of a difference that noise does not make.
 const CHANGE: f64 = 3.0;
 /// Difference that all larger ones count as, grey levels.
@@ -34,7 +31,7 @@ const VOTES: f64 = 1024.0;
 
 /// The first frame about the box.
 #[derive(Debug)]
-pub(super) struct Outset {
+pub(super) struct InitialSegmentation {
     pub bounds: TargetBox,
     pub target: Target,
     pub first: Patch,
@@ -49,18 +46,7 @@ pub(super) struct Outset {
     told: usize,
 }
 
-/// Part of the first box is something still before the target.
-#[derive(Debug)]
-pub(super) struct Uncovered {
-    /// How far the target moved since the first frame, px.
-    pub moved: [f64; 2],
-    /// Frames since then.
-    pub frames: usize,
-    /// Pixels of the patch that are in the box and not the target's.
-    pub hidden: Frame<bool>,
-}
-
-impl Outset {
+impl InitialSegmentation {
     pub fn new(frame: &Frame<f64>, bounds: TargetBox, target: Target) -> Self {
         let reach = [bounds.width, bounds.height].map(|side| side / 2.0 + FARTHEST as f64 + 2.0);
         let cut = bounds_about(bounds.centre(), reach, frame.size());
@@ -87,15 +73,14 @@ impl Outset {
         Changes { outset: self, now, bar: CHANGE * noise * std::f64::consts::SQRT_2 }
     }
 
-    /// What the next frame tells of the first box.
-    pub fn tell(&mut self, frame: &Frame<f64>, noise: f64) -> Option<Uncovered> {
+    /// A frame that is looked at.
+    pub fn advance(&mut self) {
         self.frames += 1;
-        let changes = self.changes(frame, noise);
-        let moved = changes.displacement()?;
-        let told = moved[0] * moved[0] + moved[1] * moved[1] > LEAST;
-        let hidden = if told { segment::hidden(&changes, moved) } else { None };
+    }
+
+    /// Keeps the displacement found in the last frame.
+    pub fn keep_displacement(&mut self, moved: [isize; 2]) {
         (self.moved, self.told) = (moved, self.frames);
-        hidden.map(|hidden| Uncovered { moved: moved.map(|m| m as f64), frames: self.frames, hidden })
     }
 
     /// Frames since the first.
@@ -116,7 +101,7 @@ impl Outset {
 
 /// A later frame beside the first.
 pub(super) struct Changes<'a> {
-    pub outset: &'a Outset,
+    pub outset: &'a InitialSegmentation,
     pub now: Frame<f64>,
     /// Largest change that noise makes, grey levels.
     pub bar: f64,
@@ -156,8 +141,8 @@ impl Changes<'_> {
 
     /// The smallest displacement of the box that explains nearly as much as any; `None` where nothing moves,
     /// or not as a whole.
-    fn displacement(&self) -> Option<[isize; 2]> {
-        let Outset { inside, frames, moved, .. } = self.outset;
+    pub fn displacement(&self) -> Option<[isize; 2]> {
+        let InitialSegmentation { inside, frames, moved, .. } = self.outset;
         let (now, before) = (*frames as isize, *frames as isize - 1);
         let (middle, reach) =
             if before == 0 { ([0; 2], REACH[0]) } else { (moved.map(|m| m * now / before), REACH[1]) };
@@ -220,70 +205,4 @@ impl Changes<'_> {
 /// How far a value is beyond two limits.
 fn beyond([low, high]: [f64; 2], value: f64) -> f64 {
     (low - value).max(value - high).max(0.0)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::random::CounterRng;
-
-    const SIDE: usize = 20;
-
-    /// A square that was at (40, 30) at first, `moved` since, with what hides it up to a column, before
-    /// texture.
-    fn scene(moved: [usize; 2], hidden_to: usize, seed: u64) -> Frame<f64> {
-        let rng = CounterRng::new(seed);
-        Frame::from_fn(110, 80, |x, y| {
-            let target = (40 + moved[0]..40 + moved[0] + SIDE).contains(&x)
-                && (30 + moved[1]..30 + moved[1] + SIDE).contains(&y);
-            let behind = 90.0 + 20.0 * (0.3 * x as f64).sin() * (0.2 * y as f64).cos();
-            let brightness = match (x < hidden_to, target) {
-                (true, _) => 130.0,
-                (_, true) => 200.0,
-                _ => behind,
-            };
-            brightness + 1.5 * rng.normal((110 * y + x) as u64)
-        })
-    }
-
-    /// What is told when the square has moved once.
-    fn told(bounds: TargetBox, moved: [usize; 2], hidden_to: usize) -> Option<Uncovered> {
-        let first = scene([0; 2], hidden_to, 1);
-        let mut outset = Outset::new(&first, bounds, Target::new(&first, bounds, 144.0));
-        outset.tell(&scene(moved, hidden_to, 2), 1.5)
-    }
-
-    fn exact() -> TargetBox {
-        TargetBox { x: 39.5, y: 29.5, width: SIDE as f64, height: SIDE as f64 }
-    }
-
-    #[test]
-    fn what_hides_part_of_the_box_is_told_to_the_pixel() {
-        for hidden_to in [44, 50, 54] {
-            let found = told(exact(), [4, 1], hidden_to).unwrap();
-            assert_eq!((found.moved, found.frames), ([4.0, 1.0], 1));
-            let count = found.hidden.data().iter().filter(|hidden| **hidden).count();
-            assert_eq!(count, (hidden_to - 40) * SIDE, "{hidden_to}");
-        }
-    }
-
-    #[test]
-    fn a_target_that_nothing_hides_is_left_alone_whether_its_box_is_right_or_not() {
-        assert!(told(exact(), [4, 1], 0).is_none());
-        assert!(told(TargetBox { x: 35.5, y: 25.5, width: 28.0, height: 28.0 }, [4, 1], 0).is_none());
-        assert!(told(TargetBox { x: 43.5, y: 33.5, width: 12.0, height: 12.0 }, [4, 1], 0).is_none());
-        // What does not move tells nothing.
-        assert!(told(exact(), [0, 0], 50).is_none());
-    }
-
-    #[test]
-    fn waiting_ends() {
-        let first = scene([0; 2], 50, 1);
-        let mut outset = Outset::new(&first, exact(), Target::new(&first, exact(), 144.0));
-        for _ in 0..FRAMES {
-            assert!(!outset.is_over());
-            outset.skip();
-        }
-        assert!(outset.is_over());
-    }
 }

@@ -199,8 +199,8 @@ fn starts<V: Lanes>(range: Range<usize>) -> impl Iterator<Item = usize> {
 mod tests {
     use super::*;
     use crate::math::random::CounterRng;
-    use crate::track::gradient::kernels::SIDE;
-    use crate::track::gradient::kernels::derivative_kernels;
+    use crate::track::gradient::reference::kernels::SIDE;
+    use crate::track::gradient::reference::kernels::derivative_kernels;
 
     /// Straight from the definition.
     fn sums_at(

@@ -5,15 +5,14 @@
 //! needs: a gate for weak gradients, two starts of the flow, steering by position, a gate for innovations,
 //! and a rule for targets that stop. [`Rules::paper`] is the text to the letter.
 
-use super::detect::detect_moving_target;
 use super::extent::{Ends, Extent, ends};
-use super::gauss_markov::{GaussMarkovFilter, Measurement};
-use super::local_flow::{LocalFlow, MeanFlow, median};
-use super::options::{Control, GradientOptions};
-use super::rules::Rules;
-use super::window::{side, whole_pixels};
+use super::local_flow::{LocalFlow, MeanFlow};
+use super::options::{Control, ReferenceOptions, Rules};
 use crate::image::Interpolation;
 use crate::math::MAD_TO_STD;
+use crate::track::gradient::detect::detect_moving_target;
+use crate::track::gradient::gauss_markov::{GaussMarkovFilter, Measurement};
+use crate::track::gradient::noise::median;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 
 /// Pixels around the window that masks need.
@@ -45,8 +44,8 @@ const HIDDEN: f64 = 0.6;
 const HARDLY: f64 = 0.6;
 /// Frames without motion after which the target counts as lost.
 const LOST_AFTER: usize = 15;
-/// Least automatic `eps`, px/frame.
-const LEAST_EPS: f64 = 0.3;
+/// Least automatic `min_speed`, px/frame.
+const MIN_SPEED: f64 = 0.3;
 
 /// Moving pixels around the target, over those of all that moves, from which on they are more than a few
 /// strays.
@@ -65,15 +64,15 @@ struct Measured {
 
 /// One target in the loop.
 #[derive(Debug)]
-pub(super) struct LocalLoop {
+pub(in crate::track::gradient) struct LocalLoop {
     rules: Rules,
-    fov: usize,
+    search_window: usize,
     control: Control,
-    eps: Option<f64>,
+    min_speed: Option<f64>,
     filter: GaussMarkovFilter,
     size: [f64; 2],
     /// Centre of the window.
-    sight: [f64; 2],
+    window_center: [f64; 2],
     /// What the window showed in the frame before.
     before: Frame<f64>,
     /// How many pixels of the target move where none is hidden; 0: not known yet.
@@ -85,19 +84,32 @@ pub(super) struct LocalLoop {
     seen: f64,
     refused: usize,
     missed: usize,
+    /// How many pixels moved in the last frame.
+    flow_count: usize,
+}
+
+/// The window that is searched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchWindow {
+    /// Its center, px.
+    pub center: [f64; 2],
+    /// Its side, px.
+    pub side: usize,
+    /// How many pixels moved in it.
+    pub flow_count: usize,
 }
 
 impl LocalLoop {
-    pub fn new(frame: &Frame<f64>, bounds: TargetBox, options: &GradientOptions) -> Self {
+    pub fn new(frame: &Frame<f64>, bounds: TargetBox, options: &ReferenceOptions) -> Self {
         let rules = Rules::of(options);
         let centre = bounds.centre();
         let mut this = Self {
-            fov: side(options.fov, bounds, frame.size()),
+            search_window: side(options.search_window, bounds, frame.size()),
             control: options.control,
-            eps: options.eps,
+            min_speed: options.min_speed,
             filter: GaussMarkovFilter::new(centre, rules.dynamics, rules.velocity),
             size: [bounds.width, bounds.height],
-            sight: centre,
+            window_center: centre,
             before: Frame::default(),
             usual: 0.0,
             extent: Extent::new([bounds.width, bounds.height].map(|side| side + 0.5 * rules.flow.window as f64)),
@@ -105,15 +117,16 @@ impl LocalLoop {
             seen: 1.0,
             refused: 0,
             missed: 0,
+            flow_count: 0,
             rules,
         };
         this.before = this.cut(frame);
         this
     }
 
-    /// Side of the window, px.
-    pub fn fov(&self) -> f64 {
-        self.fov as f64
+    /// The window, and how many pixels moved in it.
+    pub fn window(&self) -> SearchWindow {
+        SearchWindow { center: self.window_center(), side: self.search_window, flow_count: self.flow_count }
     }
 
     /// Covariance of the filter along x and y.
@@ -126,6 +139,7 @@ impl LocalLoop {
         let second = frame.map(|frame| self.cut(frame));
         let told = second.as_ref().map(|second| self.measure(second));
         let (found, ends) = (told.map(|told| told.mean), told.and_then(|told| told.ends));
+        self.flow_count = found.map_or(0, |mean| mean.count);
         let all_moves = told.is_some_and(|told| told.all_moves);
         let was_lost = self.missed >= LOST_AFTER;
         self.filter.predict();
@@ -233,34 +247,34 @@ impl LocalLoop {
         let starts: &[[f64; 2]] = if self.rules.rest { &[[0.0; 2], velocity] } else { &[velocity] };
         let mut flow = self.rules.flow.flow_from(first, second, starts, self.rules.flat);
         self.keep_window(&mut flow);
-        let eps = self.eps.unwrap_or_else(|| self.automatic_eps(&flow));
-        let mut mean = flow.mean(eps);
-        let all_moves = self.rules.careful && self.all_moves(&flow, &mean, eps);
+        let min_speed = self.min_speed.unwrap_or_else(|| self.automatic_min_speed(&flow));
+        let mut mean = flow.mean(min_speed);
+        let all_moves = self.rules.careful && self.all_moves(&flow, &mean, min_speed);
         let corner = self.corner();
         mean.centroid = [mean.centroid[0] + corner[0], mean.centroid[1] + corner[1]];
         // What is farther than a step of local flow moves where it was and where it is.
         let near = mean.velocity[0].hypot(mean.velocity[1]) < self.rules.flow.step_max;
-        let ends = ends(&flow, eps).filter(|_| self.rules.careful && near);
+        let ends = ends(&flow, min_speed).filter(|_| self.rules.careful && near);
         let ends = ends.map(|ends| [0, 1].map(|k| ends[k].map(|end| end + corner[k] + mean.velocity[k])));
         Measured { mean, ends, all_moves }
     }
 
     /// Centre of the window that is cut.
-    fn line_of_sight(&self) -> [f64; 2] {
+    fn window_center(&self) -> [f64; 2] {
         match self.control {
-            Control::Integer => self.sight.map(|at| (at + 0.5).floor()),
-            Control::Subpixel => self.sight,
+            Control::Integer => self.window_center.map(|at| (at + 0.5).floor()),
+            Control::Subpixel => self.window_center,
         }
     }
 
     /// Upper left pixel of what is cut out, margin included.
     fn corner(&self) -> [f64; 2] {
-        self.line_of_sight().map(|at| at - (self.fov / 2 + MARGIN) as f64)
+        self.window_center().map(|at| at - (self.search_window / 2 + MARGIN) as f64)
     }
 
     /// The window with its margin; NaN outside the picture.
     fn cut(&self, frame: &Frame<f64>) -> Frame<f64> {
-        let (corner, side) = (self.corner(), self.fov + 2 * MARGIN);
+        let (corner, side) = (self.corner(), self.search_window + 2 * MARGIN);
         if self.control == Control::Integer {
             return whole_pixels(frame, corner.map(|at| at as isize), side);
         }
@@ -277,7 +291,7 @@ impl LocalLoop {
 
     /// Only pixels of the window itself count.
     fn keep_window(&self, flow: &mut LocalFlow) {
-        let inside = MARGIN..MARGIN + self.fov;
+        let inside = MARGIN..MARGIN + self.search_window;
         let (width, height) = flow.accepted.size();
         for y in 0..height {
             for x in 0..width {
@@ -289,17 +303,17 @@ impl LocalLoop {
     }
 
     /// Three deviations of the accepted flow outside the target.
-    fn automatic_eps(&self, flow: &LocalFlow) -> f64 {
+    fn automatic_min_speed(&self, flow: &LocalFlow) -> f64 {
         let mut sizes: Vec<f64> = self.around(flow).flat_map(|w| w.map(f64::abs)).collect();
-        (3.0 * MAD_TO_STD * median(&mut sizes)).max(LEAST_EPS)
+        (3.0 * MAD_TO_STD * median(&mut sizes)).max(MIN_SPEED)
     }
 
     /// Whether most of what is around the target moves, and is a good part of all that does: the camera
     /// moves, or the window shows something else.
-    fn all_moves(&self, flow: &LocalFlow, mean: &MeanFlow, eps: f64) -> bool {
+    fn all_moves(&self, flow: &LocalFlow, mean: &MeanFlow, min_speed: f64) -> bool {
         let (mut moving, mut all) = (0, 0);
         for w in self.around(flow) {
-            moving += usize::from(w[0].abs() >= eps || w[1].abs() >= eps);
+            moving += usize::from(w[0].abs() >= min_speed || w[1].abs() >= min_speed);
             all += 1;
         }
         2 * moving > all && moving > FEWEST && moving as f64 > ALL * mean.count as f64
@@ -324,10 +338,10 @@ impl LocalLoop {
             self.filter.position()
         } else {
             let velocity = self.filter.speed();
-            [0, 1].map(|k| self.sight[k] + velocity[k])
+            [0, 1].map(|k| self.window_center[k] + velocity[k])
         };
         if to.iter().all(|at| at.is_finite()) {
-            self.sight = to;
+            self.window_center = to;
         }
     }
 
@@ -337,7 +351,6 @@ impl LocalLoop {
         found: Option<MeanFlow>,
         (innovation, measured, was_lost): (f64, bool, bool),
     ) {
-        let count = found.map_or(0, |mean| mean.count);
         (state.status, state.reason) = match (measured, found) {
             (true, _) => (TrackStatus::Tracking, ""),
             _ if self.missed >= LOST_AFTER => (TrackStatus::Lost, "nothing that moves like the target for long"),
@@ -356,7 +369,35 @@ impl LocalLoop {
         state.rotation_observable = false;
         state.visibility = f64::from(u8::from(measured));
         state.innovation = innovation;
-        (state.line_of_sight, state.fov) = (self.line_of_sight(), self.fov());
-        state.flow_count = count;
     }
+}
+
+/// Side of the window of small targets, px.
+const MIN_SEARCH_WINDOW: usize = 51;
+/// Side of the window over that of a large target.
+const SEARCH_WINDOW_PER_TARGET: f64 = 1.6;
+
+/// Side of the window, px: as wanted, or as the target needs it. Beyond the frame there is nothing, and a
+/// window has a middle.
+fn side(wanted: Option<usize>, bounds: TargetBox, (width, height): (usize, usize)) -> usize {
+    let needed = (SEARCH_WINDOW_PER_TARGET * bounds.width.max(bounds.height)) as usize;
+    wanted.unwrap_or(needed.max(MIN_SEARCH_WINDOW)).min(2 * width.max(height)) | 1
+}
+
+/// A square of the frame from a corner on; NaN outside.
+fn whole_pixels(frame: &Frame<f64>, corner: [isize; 2], side: usize) -> Frame<f64> {
+    // Columns or rows of the square that are in the frame.
+    let within = |corner: isize, length: usize| {
+        let first = (-corner).clamp(0, side as isize);
+        let end = (length as isize - corner).clamp(first, side as isize);
+        first as usize..end as usize
+    };
+    let columns = within(corner[0], frame.width());
+    let mut out = Frame::filled(side, side, f64::NAN);
+    for y in within(corner[1], frame.height()).filter(|_| !columns.is_empty()) {
+        let from = (corner[0] + columns.start as isize) as usize;
+        let row = &frame.row((corner[1] + y as isize) as usize)[from..from + columns.len()];
+        out.row_mut(y)[columns.clone()].copy_from_slice(row);
+    }
+    out
 }

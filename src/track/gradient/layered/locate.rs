@@ -1,0 +1,154 @@
+//! The target in a frame: where the filter expects it, beside what covers or touches it, or all around.
+
+use super::finding::{DOUBT, Finding, LEAK, LEAST, LEVELS, PRIOR, SEARCHED, SURE, TOUCHED, WELL, try_at};
+use super::occlusion::{is_settled, locate_entering_occlusion, locate_occluded, may_be_held_back, position_std};
+use super::reshaped::locate_reshaped;
+use super::resized::locate_resized;
+use super::scene::shift;
+use super::search::search;
+use super::state::{GROWN, State};
+use super::task::{MotionModel, VoteMask};
+use crate::types::Frame;
+
+/// That of size and angle where a look-alike touches, whose pull may go a long way with the target.
+pub(super) const STIFF: f64 = 0.005;
+/// Below this visibility it is looked for all around.
+pub(super) const BADLY: f64 = 0.6;
+/// Least difference of the target from what is behind it, over the noise.
+pub(super) const VISIBLE: f64 = 1.0;
+/// The same from which on, on one side, a look-alike touches.
+pub(super) const TOUCH: (f64, f64) = (0.08, 0.6);
+/// What is said where it did a moment ago, and its pull may still be felt.
+pub(super) const TOUCHED_BEFORE: &str = "something like the target touched it a moment ago";
+/// Loss of size from one frame to the next that only cover makes.
+pub(super) const SHRUNK: f64 = 0.1;
+/// Reach of the search, px: at first, and at most.
+pub(super) const REACH: (usize, usize) = (12, 36);
+
+/// The target in the frame, if it is seen well enough to be measured.
+pub(super) fn locate(state: &State, frame: &Frame<f64>) -> Option<Finding> {
+    let interrupted = state.history.occluded || state.history.missed > 0;
+    let levels = if state.history.age > 0 && state.history.missed == 0 { &LEVELS[1..] } else { &LEVELS[..] };
+    let plain = try_at(state, frame, &state.expected(), (state.motion_model, VoteMask::None, PRIOR, levels));
+    let mut best = plain;
+    let doubted = crate::ablation::keeps("gradient.occlusion")
+        && plain.is_none_or(|found| {
+            found.score.visibility < WELL || found.nis > DOUBT || state.has_shrunk(&found.aligned.pose)
+        });
+    let held_back = plain.filter(|plain| {
+        crate::ablation::keeps("gradient.held_back") && is_settled(state) && may_be_held_back(state, plain)
+    });
+    if (doubted || interrupted || held_back.is_some())
+        && is_settled(state)
+        && crate::ablation::keeps("gradient.occlusion")
+    {
+        let begun = || {
+            held_back
+                .filter(|_| crate::ablation::keeps("gradient.begun_cover"))
+                .and_then(|plain| locate_entering_occlusion(state, frame, &plain))
+        };
+        best = locate_occluded(state, frame, plain, levels).or_else(begun).or(best);
+    }
+    if let Some(plain) = plain.filter(|_| state.history.age > 0 && crate::ablation::keeps("gradient.reshaped")) {
+        best = locate_reshaped(state, frame, &plain, levels).or(best);
+    }
+    let touched = best
+        .filter(|found| crate::ablation::keeps("gradient.look_alike") && is_settled(state) && !found.occluded)
+        .and_then(|found| look_alike_reason(state, &found));
+    if let Some(reason) = touched {
+        best = locate_beside_look_alike(state, frame, levels, reason).or(best);
+    }
+    if best.is_none_or(|found| found.score.visibility < BADLY && !found.occluded) {
+        best = search_around(state, frame).or(best);
+    }
+    if let Some(covered) = best.filter(|found| found.occluded) {
+        best = locate_resized(state, frame, &covered).filter(|_| crate::ablation::keeps("gradient.resized")).or(best);
+    }
+    let best = best.filter(|found| !crate::ablation::keeps("gradient.remainder") || !is_remainder(state, found));
+    let least = LEAST[usize::from(state.history.missed > 0)];
+    best.filter(|found| {
+        found.score.visibility >= least
+            && (!crate::ablation::keeps("gradient.minimum_contrast")
+                || found.score.contrast >= VISIBLE * state.scene.noise)
+    })
+}
+
+/// Whether what was found is only what is left of a target that was covered or not seen in the frame
+/// before, for the edge of what covers it stands for its own: it is seen badly and became smaller, by
+/// much, or, right after it was covered, by less but off its way. Such a target is not seen; its way
+/// would end at that edge.
+pub(super) fn is_remainder(state: &State, found: &Finding) -> bool {
+    let pose = &found.aligned.pose;
+    let off = found.nis > DOUBT && found.score.leak < LEAK && state.has_shrunk(pose);
+    let shrunk = pose.scale() < (1.0 - SHRUNK) * state.motion.pose.scale();
+    let was_hidden = state.history.occluded || state.history.missed > 0;
+    !found.occluded && found.score.visibility < WELL && (state.history.occluded && off || was_hidden && shrunk)
+}
+
+/// Whether something that looks like the target touches it: much of it beside the target, on one side. A
+/// moment after that was so, what pulls the target out of its way or makes it grow is still the
+/// look-alike. That ends by itself: size and way of the target are not followed meanwhile, and would
+/// differ the more the longer it lasts.
+pub(super) fn look_alike_reason(state: &State, found: &Finding) -> Option<&'static str> {
+    if found.score.leak > TOUCH.0 && found.score.one_sided > TOUCH.1 {
+        return Some(TOUCHED);
+    }
+    let grown = (found.aligned.pose.scale() / state.motion.pose.scale() - 1.0).abs() > GROWN;
+    (state.history.look_alike_cooldown > 0
+        && crate::ablation::keeps("gradient.look_alike_cooldown")
+        && (found.nis > SURE || grown))
+        .then_some(TOUCHED_BEFORE)
+}
+
+/// Something that looks like the target touches it.
+pub(super) fn locate_beside_look_alike(
+    state: &State,
+    frame: &Frame<f64>,
+    levels: &[f64],
+    reason: &'static str,
+) -> Option<Finding> {
+    let how = (
+        state.motion_model,
+        VoteMask::LookAlike,
+        [position_std(state), if crate::ablation::keeps("gradient.look_alike_stiff") { STIFF } else { PRIOR[1] }],
+        levels,
+    );
+    let found = try_at(state, frame, &state.expected(), how)?;
+    Some(Finding { occluded: true, reason, ..found })
+}
+
+/// All around, in whole pixels, and then as usual.
+pub(super) fn search_around(state: &State, frame: &Frame<f64>) -> Option<Finding> {
+    if !crate::ablation::keeps("gradient.search") {
+        return None;
+    }
+    let reach = (REACH.0 + state.history.missed).min(REACH.1);
+    let guess = state.expected();
+    let place = search(frame, &state.target, &state.background, (&guess, 1.0), reach)?;
+    let how = (MotionModel::Translation, VoteMask::None, PRIOR, &LEVELS[1..]);
+    let found = try_at(state, frame, &place, how)?;
+    (found.score.visibility >= WELL).then_some(Finding { reason: SEARCHED, ..found })
+}
+
+/// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the
+/// camera follows the target: where one of the two is doubtful, the other is tried.
+pub(super) fn locate_with_camera(state: &mut State, frame: &Frame<f64>, motion: [f64; 2]) -> Option<Finding> {
+    let against = motion.map(|m| -m);
+    if motion != [0.0; 2] && state.motion.rides_camera {
+        shift(state, against);
+    }
+    let first = locate(state, frame);
+    let nis = |found: &Option<Finding>| found.map_or(f64::INFINITY, |f| if f.occluded { DOUBT } else { f.nis });
+    if !crate::ablation::keeps("gradient.with_camera") || motion == [0.0; 2] || nis(&first) < SURE {
+        return first;
+    }
+    let (there, back) = if state.motion.rides_camera { (motion, against) } else { (against, motion) };
+    shift(state, there);
+    let second = locate(state, frame);
+    if nis(&second) < nis(&first) {
+        state.motion.rides_camera = !state.motion.rides_camera;
+        return second;
+    }
+    shift(state, back);
+    first
+}

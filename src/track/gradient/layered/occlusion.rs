@@ -1,0 +1,98 @@
+//! Targets that something known covers in part, or begins to cover.
+
+use super::finding::{COVERED, DOUBT, DROP, Finding, LEAK, LEVELS, PRIOR, YOUNG, try_at};
+use super::score::Score;
+use super::state::State;
+use super::task::{MotionModel, VoteMask};
+use crate::types::Frame;
+
+/// Visibility of a target of which nothing is hidden.
+pub(super) const WHOLE: f64 = 0.95;
+/// Loss of visibility that noise alone may make.
+pub(super) const SLIGHT: f64 = 0.03;
+/// Width of a strip along a side of the target that is begun to be covered, px: of smaller targets it is a
+/// loss of visibility.
+pub(super) const STRIP: f64 = 1.25;
+/// Distance of two poses that a covered edge makes, px.
+pub(super) const HELD_BACK: f64 = 0.5;
+
+/// Something known covers the target: only its position is looked for, where it is not covered.
+pub(super) fn locate_occluded(
+    state: &State,
+    frame: &Frame<f64>,
+    plain: Option<Finding>,
+    levels: &[f64],
+) -> Option<Finding> {
+    let how = (MotionModel::Translation, VoteMask::Occluded, [position_std(state), PRIOR[1]], levels);
+    let found = try_at(state, frame, &state.expected(), how)?;
+    let dropped = |score: &Score, by: f64| score.visibility < state.history.mean_visibility - by;
+    // What is seen as well as ever in a place that nobody expected has made a turn; unless it became
+    // smaller at that, as what lies between the bars of a fence.
+    let turned =
+        |plain: &Finding| plain.nis > DOUBT && !dropped(&plain.score, SLIGHT) && !state.has_shrunk(&plain.aligned.pose);
+    // Nor has one that is where it is expected but for a strip along its side, and would be smaller or
+    // less seen elsewhere.
+    let begins = plain.is_some_and(|plain| plain.nis > DOUBT && !turned(&plain) && is_held_back(state, &found, &plain));
+    // The last strip of a large target is not to be taken for background.
+    let drop = if begins || state.history.occluded && is_large(state) { SLIGHT } else { DROP };
+    let also = plain.is_none_or(|plain| !turned(&plain) && (dropped(&plain.score, drop) || plain.nis > DOUBT));
+    let held_back = plain.is_some_and(|plain| may_be_held_back(state, &plain) && is_held_back(state, &found, &plain));
+    let taken = found.score.leak < LEAK && dropped(&found.score, drop) && (also || held_back);
+    taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
+}
+
+/// Something known begins to cover a large target, and its edge stands for the target's own: what is on
+/// the side towards which the target is off has no vote.
+pub(super) fn locate_entering_occlusion(state: &State, frame: &Frame<f64>, plain: &Finding) -> Option<Finding> {
+    let (at, expected) = (state.position(&plain.aligned.pose), state.motion.filter.position());
+    let side = VoteMask::Towards([expected[0] - at[0], expected[1] - at[1]]);
+    let how = (MotionModel::Translation, side, PRIOR, &LEVELS[1..]);
+    let found = try_at(state, frame, &state.expected(), how)?;
+    let taken = found.score.leak < LEAK && is_held_back(state, &found, plain);
+    taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
+}
+
+/// Whether what is not seen of it may be covered. While the support is still adapting to the box that is
+/// not told, but of a large target that was seen whole: of a small one a wrong box leaves as much unseen
+/// as cover.
+pub(super) fn is_settled(state: &State) -> bool {
+    state.history.age >= YOUNG && !state.is_adapting()
+        || crate::ablation::keeps("gradient.known_if_large") && state.history.max_visibility > WHOLE && is_large(state)
+}
+
+/// Whether a strip along a side is little of the target.
+pub(super) fn is_large(state: &State) -> bool {
+    STRIP / state.side() < DROP
+}
+
+/// Whether a large target is not where it is expected. The filter takes turns for granted, and is no
+/// judge of fractions of a pixel.
+pub(super) fn may_be_held_back(state: &State, plain: &Finding) -> bool {
+    is_large(state) && distance_from_expected(state, plain) > HELD_BACK
+}
+
+/// Whether a large target is rather `elsewhere`, nearer to where it is expected, than where it would be
+/// if all of it were seen, `plain`. The edge of what begins to cover a plain target stands for its own,
+/// and holds it back or makes it shrink at the price of another: the area that is not explained stays the
+/// same. A target that has really turned leaves two strips that are not, one on either side of the
+/// expected place, as long as the target is wide and as wide as it is off.
+pub(super) fn is_held_back(state: &State, elsewhere: &Finding, plain: &Finding) -> bool {
+    let [at, held] = [elsewhere, plain].map(|finding| state.position(&finding.aligned.pose));
+    let apart = (at[0] - held[0]).hypot(at[1] - held[1]);
+    let strip = apart * state.side() / plain.aligned.pose.scale().max(0.1);
+    crate::ablation::keeps("gradient.held_back")
+        && apart > HELD_BACK
+        && elsewhere.nis < DOUBT
+        && elsewhere.score.mismatch < plain.score.mismatch + strip
+}
+
+/// Distance from where the target is expected, px.
+pub(super) fn distance_from_expected(state: &State, found: &Finding) -> f64 {
+    let (at, expected) = (state.position(&found.aligned.pose), state.motion.filter.position());
+    (at[0] - expected[0]).hypot(at[1] - expected[1])
+}
+
+/// Deviation of the expected position, px.
+pub(super) fn position_std(state: &State) -> f64 {
+    (0.5 * (state.motion.filter.p[0][(0, 0)] + state.motion.filter.p[1][(0, 0)])).sqrt().clamp(0.2, 3.0)
+}

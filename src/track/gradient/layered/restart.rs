@@ -1,0 +1,156 @@
+//! Beginning anew where something still hid part of the target in the first frame: that part is the target's
+//! all the same, but is not known yet, and what hides it is known.
+
+use super::finding::YOUNG;
+use super::initial::InitialSegmentation;
+use super::layers::{Background, PRIOR, Target, UNSEEN, grown, holds};
+use super::learn::{CONTINUED, SOLID};
+use super::occluder::{HiddenPart, find_occluder};
+use super::patch::{dilated, smooth_known};
+use super::pose::Pose;
+use super::refit::TURNED;
+use super::state::{ADAPTED, State, start_filter};
+use crate::track::gradient::detect::MovingTarget;
+use crate::types::{Frame, TargetBox};
+
+/// Variance of the displacement since the first frame, which is told in whole pixels, px^2.
+const WHOLE_PIXELS: f64 = 0.5;
+/// Difference of displacements that whole pixels, and what is behind the target, may make, px.
+const WHOLE: f64 = 2.0;
+/// Deviation of the middle of what moved, whose sides are told to a pixel, px.
+const UNSETTLED: f64 = 0.6;
+/// Change in still places that noise does not make, over the noise.
+const STILL: f64 = 4.0;
+
+/// Looks whether the frame tells what the first box held.
+pub(super) fn resolve_initial(state: &mut State, frame: &Frame<f64>, motion: [f64; 2]) {
+    let Some(mut outset) = state.initial.take().filter(|_| motion == [0.0; 2]) else { return };
+    match find_occluder(&mut outset, frame, state.scene.noise) {
+        Some(found) => restart_occluded(state, &outset, &found, frame),
+        None => match outset
+            .outgrown(frame, state.scene.noise)
+            .filter(|_| crate::ablation::keeps("gradient.start_outgrown"))
+            .or_else(|| {
+                box_of_motion(state, &outset, frame).filter(|_| crate::ablation::keeps("gradient.start_refitted"))
+            }) {
+            Some(found) => restart_with_box(state, &found, frame, outset.frames()),
+            None if outset.is_over() => {}
+            None => state.initial = Some(outset),
+        },
+    }
+}
+
+/// The box of what moves, unless the target turned, which changes the outline as well. Its size says
+/// nothing: a box beside the target makes that seem to change.
+pub(super) fn box_of_motion(state: &State, outset: &InitialSegmentation, frame: &Frame<f64>) -> Option<MovingTarget> {
+    if state.motion.rotation.abs() < TURNED { outset.refitted(frame, state.scene.noise) } else { None }
+}
+
+pub(super) fn restart_occluded(
+    state: &mut State,
+    outset: &InitialSegmentation,
+    found: &HiddenPart,
+    frame: &Frame<f64>,
+) {
+    let at = outset.bounds.centre();
+    state.target = outset.target.clone();
+    let ([x0, y0], (width, height)) = (outset.first.corner, found.hidden.size());
+    state.target.hide(|xi| {
+        let pixel = |at: f64, corner: usize, length: usize| {
+            ((at + 0.5).floor() - corner as f64).clamp(0.0, length as f64 - 1.0) as usize
+        };
+        found.hidden.get(pixel(at[0] + xi[0], x0, width), pixel(at[1] + xi[1], y0, height))
+    });
+    state.background.begin_anew(outset, found, frame, STILL * state.scene.noise);
+    restart_at(state, [at[0] + found.moved[0], at[1] + found.moved[1]], found.moved, found.frames);
+    (state.history.occluded, state.history.age, state.history.adapts_until) = (true, YOUNG, 0);
+}
+
+/// The first box was not that of what moves.
+pub(super) fn restart_with_box(state: &mut State, found: &MovingTarget, frame: &Frame<f64>, frames: usize) {
+    state.target = Target::new(frame, found.bounds, PRIOR);
+    state.background = Background::new(frame, found.bounds);
+    let turned = state.motion.rotation;
+    restart_at(state, found.bounds.centre(), found.displacement, frames);
+    state.motion.rotation = turned;
+    state.uncertainty.outline = [UNSETTLED; 2];
+}
+
+/// Begins at a place that was reached in so many frames, by a displacement in whole pixels.
+pub(super) fn restart_at(state: &mut State, centre: [f64; 2], moved: [f64; 2], frames: usize) {
+    state.motion.pose = Pose::at(centre);
+    state.motion.filter = start_filter(centre);
+    for (k, (x, p)) in state.motion.filter.x.iter_mut().zip(&mut state.motion.filter.p).enumerate() {
+        x[1] = moved[k] / frames as f64;
+        (p[(0, 0)], p[(1, 1)]) = (WHOLE_PIXELS, 1.0);
+    }
+    (state.motion.last_position, state.history.mean_visibility) = (None, 1.0);
+    (state.history.missed, state.history.occluded, state.history.age, state.history.max_visibility) =
+        (0, false, 0, 0.0);
+    (state.motion.rotation, state.history.look_alike_cooldown) = (0.0, 0);
+    (state.last_good, state.history.adapts_until) = (None, ADAPTED);
+}
+
+/// As long as the first box is not told from what it held besides, what is said of the way since then may
+/// be wrong by as much as the displacement of all that moved differs from it.
+pub(super) fn update_displacement_uncertainty(state: &mut State) {
+    let told = state.initial.as_ref().and_then(|outset| outset.moved().map(|moved| (moved, outset.bounds.centre())));
+    let Some((moved, first)) = told else { return state.uncertainty.displacement = [0.0; 2] };
+    let (at, size) = (state.motion.filter.position(), state.target.size);
+    // The sides of what grows move otherwise than its middle.
+    let grown = (state.motion.pose.scale() - 1.0).abs();
+    state.uncertainty.displacement = [0, 1].map(|k| {
+        let apart = (at[k] - first[k] - moved[k]).abs();
+        if crate::ablation::keeps("gradient.start_doubt") && apart > WHOLE + 0.5 * grown * size[k] {
+            apart
+        } else {
+            0.0
+        }
+    });
+}
+
+impl Target {
+    /// Points that are not known: they are guessed to be like those nearest to them.
+    fn hide(&mut self, hidden: impl Fn([f64; 2]) -> bool) {
+        let (width, height) = self.a.size();
+        let hidden = Frame::from_fn(width, height, |i, j| hidden(self.xi(i, j)));
+        let hidden = dilated(&hidden, 1);
+        let known = |i, j| self.a.get(i, j) > SOLID && !hidden.get(i, j);
+        let mut t = Frame::from_fn(width, height, |i, j| if known(i, j) { self.t.get(i, j) } else { f64::NAN });
+        let mut reach = CONTINUED;
+        while t.data().iter().any(|t| t.is_nan()) && reach < 2.0 * width.max(height) as f64 {
+            let smooth = smooth_known(&t, reach);
+            t.data_mut().iter_mut().zip(smooth.data()).filter(|(t, _)| t.is_nan()).for_each(|(t, s)| *t = *s);
+            reach *= 2.0;
+        }
+        for (own, t) in self.t.data_mut().iter_mut().zip(t.data()) {
+            *own = if t.is_nan() { *own } else { *t };
+        }
+        self.fresh = Some(hidden.map(|hidden| f64::from(u8::from(*hidden))));
+    }
+}
+
+impl Background {
+    /// What was seen around the first box, and beside the target where that is `now`.
+    fn begin_anew(&mut self, outset: &InitialSegmentation, found: &HiddenPart, frame: &Frame<f64>, bar: f64) {
+        let bounds = outset.bounds;
+        let there = TargetBox { x: bounds.x + found.moved[0], y: bounds.y + found.moved[1], ..bounds };
+        let (first, now) = (grown(bounds, UNSEEN), grown(there, UNSEEN));
+        let [x0, y0] = outset.first.corner;
+        let (width, height) = found.hidden.size();
+        for j in 0..height {
+            for i in 0..width {
+                let (x, y, was) = (x0 + i, y0 + j, outset.first.frame.get(i, j));
+                let is = frame.get(x, y);
+                let beside = !outset.inside.get(i, j) && (was - is).abs() < bar;
+                let (value, known) = if !holds(&first, x, y) || found.hidden.get(i, j) || beside {
+                    (was, true)
+                } else {
+                    (is, !holds(&now, x, y))
+                };
+                (self.picture.row_mut(y)[x], self.known.row_mut(y)[x]) = (value, known);
+            }
+        }
+        self.guess(&now, |_, _| false);
+    }
+}

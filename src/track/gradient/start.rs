@@ -1,0 +1,109 @@
+//! How a tracker starts: the checks of the first frame, box and point, and the search for the first object
+//! that moves.
+
+use super::detect::{camera_moved, detect_moving_target};
+use super::layered;
+use super::options::CameraMotion;
+use crate::error::{Error, Result};
+use crate::image::all_finite;
+use crate::track::grey_levels::GREATEST;
+use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
+
+/// Smallest side of a frame, px.
+const MIN_FRAME_SIDE: usize = 16;
+/// Smallest side of a target, px.
+const MIN_BOX_SIDE: f64 = 3.0;
+/// Largest side of a box, in sides of the frame.
+const MAX_BOX_PER_FRAME: f64 = 2.0;
+
+/// Nothing has moved yet: the last frame, and the point near which the target is.
+#[derive(Debug)]
+pub(super) struct Waiting {
+    previous: Frame<f64>,
+    near: Option<[f64; 2]>,
+}
+
+impl Waiting {
+    pub fn new(frame: &Frame<f64>, near: Option<[f64; 2]>) -> Self {
+        Self { previous: frame.clone(), near }
+    }
+
+    /// Box of what moved since the last frame.
+    pub fn find(&mut self, frame: &Frame<f64>, camera: CameraMotion) -> Option<TargetBox> {
+        let still = match camera {
+            CameraMotion::Auto if camera_moved(&self.previous, frame) => layered::stilled(&self.previous, frame),
+            CameraMotion::Auto | CameraMotion::None => None,
+        };
+        let found = detect_moving_target(still.as_ref().unwrap_or(&self.previous), frame, self.near);
+        let bounds = found.and_then(|found| checked_box(found.bounds, frame.size()).ok());
+        if bounds.is_none() {
+            self.previous = frame.clone();
+        }
+        bounds
+    }
+}
+
+/// State of a target that has not moved yet.
+pub(super) fn nothing_yet(at: [f64; 2]) -> TrackState {
+    TrackState {
+        status: TrackStatus::Lost,
+        reason: "nothing has moved yet",
+        visibility: 0.0,
+        covariance: [[[f64::NAN; 3]; 3]; 2],
+        ..TrackState::at(at, TargetBox::about(at, 0.0, 0.0))
+    }
+}
+
+/// A point in the frame.
+pub(super) fn checked_point(at: [f64; 2], (width, height): (usize, usize)) -> Result<[f64; 2]> {
+    // Pixels reach half a pixel beyond their centers.
+    let inside = |at: f64, length: usize| at >= -0.5 && at < length as f64 - 0.5;
+    if inside(at[0], width) && inside(at[1], height) {
+        return Ok(at);
+    }
+    let expected = format!("a point (x, y) in the {width} x {height} frame");
+    Err(Error::argument("center", expected, format!("({}, {})", at[0], at[1])))
+}
+
+/// Checks the first frame.
+pub(super) fn check_frame(frame: &Frame<f64>) -> Result<()> {
+    let (width, height) = frame.size();
+    if width < MIN_FRAME_SIDE || height < MIN_FRAME_SIDE {
+        let expected = format!("a frame of at least {MIN_FRAME_SIDE} x {MIN_FRAME_SIDE} px");
+        return Err(Error::argument("frame", expected, format!("{width} x {height}")));
+    }
+    if !all_finite(frame) {
+        return Err(Error::argument("frame", "finite samples in the first frame", "NaN or infinity"));
+    }
+    if let Some(sample) = frame.data().iter().find(|sample| sample.abs() > GREATEST) {
+        let expected = format!("samples of at most {GREATEST:e} grey levels in the first frame");
+        return Err(Error::argument("frame", expected, format!("{sample:e}")));
+    }
+    Ok(())
+}
+
+/// Whether all samples of a frame are brightness.
+pub(super) fn is_usable(frame: &Frame<f64>) -> bool {
+    let greatest = frame.data().iter().fold(0.0, |greatest: f64, sample| greatest.max(sample.abs()));
+    greatest <= GREATEST && all_finite(frame)
+}
+
+/// A box that overlaps the frame.
+pub(super) fn checked_box(bounds: TargetBox, (width, height): (usize, usize)) -> Result<TargetBox> {
+    let TargetBox { x, y, width: w, height: h } = bounds;
+    let got = || format!("x {x}, y {y}, width {w}, height {h}");
+    if ![x, y, w, h].iter().all(|value| value.is_finite()) || w < MIN_BOX_SIDE || h < MIN_BOX_SIDE {
+        let expected = format!("finite (x, y, width, height), sides of at least {MIN_BOX_SIDE} px");
+        return Err(Error::argument("bbox", expected, got()));
+    }
+    if w > MAX_BOX_PER_FRAME * width as f64 || h > MAX_BOX_PER_FRAME * height as f64 {
+        let expected = format!("a box at most {MAX_BOX_PER_FRAME} times as large as the {width} x {height} frame");
+        return Err(Error::argument("bbox", expected, got()));
+    }
+    // Pixels reach half a pixel beyond their centers.
+    let is_apart = |from: f64, length: f64, whole: usize| from + length <= -0.5 || from >= whole as f64 - 0.5;
+    if is_apart(x, w, width) || is_apart(y, h, height) {
+        return Err(Error::argument("bbox", format!("a box that overlaps the {width} x {height} frame"), got()));
+    }
+    Ok(bounds)
+}
