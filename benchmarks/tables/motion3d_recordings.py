@@ -159,7 +159,12 @@ def spacings(data: Path, spacings: Sequence[int] = SPACINGS) -> list[Row]:
                     first = split(*points.T)
                     correlated.append(
                         halves_apart(
-                            points, vectors, covariances, first, points_per_independent_sample=shared, correlation_length=length
+                            points,
+                            vectors,
+                            covariances,
+                            first,
+                            points_per_independent_sample=shared,
+                            correlation_length=length,
                         )
                     )
                     independent.append(halves_apart(points, vectors, covariances / shared, first))
