@@ -6,7 +6,7 @@ use super::model::motion::Motion;
 use super::model::observations::Observations;
 use super::model::result::nested;
 use super::model::rows::{Matrix5, Vector5, tangents};
-use super::model::whitening::Intake;
+use super::model::whitening::Whitening;
 use super::solver::covariance::{determined, direction_deviation};
 use crate::error::{Error, Result, numbers};
 use crate::parallel::Threads;
@@ -52,7 +52,7 @@ impl MotionBound {
 ///
 /// # Errors
 /// [`Error::Argument`] for lengths that differ, fewer than 5 finite points, covariances or depths, noise that
-/// is not told, a direction of length 0; [`Error::NotObservable`] when the points do not determine the
+/// is not given, a direction of length 0; [`Error::NotObservable`] when the points do not determine the
 /// motion.
 pub fn motion_bound(
     points: &Flow<'_>,
@@ -75,7 +75,7 @@ fn of_known_depths(
         let expected = format!("{} values, one for each point", points.len());
         return Err(Error::argument("inv_depth", expected, inverse_depth.len()));
     }
-    let observations = Intake::new(points, noise, Placement::Start).whitened();
+    let observations = Whitening::new(points, noise, Placement::Start).whitened();
     if observations.n < LEAST {
         let finite = (0..points.len()).filter(|&k| points.place(k).iter().all(|value| value.is_finite())).count();
         return Err(too_few(LEAST, finite));

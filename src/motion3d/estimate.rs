@@ -1,13 +1,13 @@
-//! The whole way from flow to motion.
+//! Entry point: estimates rigid motion from optical flow.
 
 use super::diagnostics::report::{doubted, rotation_report, with_all_inliers};
-use super::diagnostics::rotation_only::{turning, turning_in_unknown_noise};
+use super::diagnostics::rotation_only::{explained_by_rotation, explained_by_rotation_in_unknown_noise};
 use super::fit::Task;
 use super::model::input::{Flow, Noise};
 use super::model::observations::Scaled;
 use super::model::options::{MotionOptions, RotationPrior};
 use super::model::result::{MotionEstimate, Status};
-use super::model::whitening::Intake;
+use super::model::whitening::Whitening;
 use super::robust;
 use super::robust::Consensus;
 use super::solver::finite_rotation::{beforehand, decides};
@@ -17,19 +17,20 @@ use crate::math::random::CounterRng;
 /// Least number of points for a motion.
 const LEAST: usize = 5;
 
-/// Times that a rotation is taken out of displacements and points that obey are looked for again.
+/// Times that a rotation is taken out of displacements and inliers are searched again.
 const TURNS: usize = 2;
 
 /// The rigid motion that explains a flow field, with covariance and depths.
 ///
 /// Maximum likelihood by a search over all directions, then the estimating equation with smoothed weights
 /// (see the module). Units: with a camera flow is in px/frame and `sigma` in px. Rows that are not finite are
-/// left out and come back as NaN. Scenes that do not determine a motion are told by
-/// [`MotionEstimate::status`] and are no error. Everything is computed in double precision.
+/// left out and come back as NaN. Degenerate scenes are reported in
+/// [`MotionEstimate::status`], not as errors. Everything is computed in double precision.
 ///
 /// # Errors
 /// [`Argument`](crate::error::Error::Argument) naming what has the wrong length or value: `flow`, `sigma`,
-/// `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`, `points_per_independent_sample`, `correlation_length`.
+/// `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`, `points_per_independent_sample`,
+/// `correlation_length`.
 pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     flow.check(noise)?;
     options.check(flow, noise)?;
@@ -38,9 +39,9 @@ pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptio
 
 fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> MotionEstimate {
     let sigma = if let Noise::Sigma(sigma) = noise { *sigma } else { 1.0 };
-    let intake = Intake::new(flow, noise, options.placement);
+    let whitening = Whitening::new(flow, noise, options.placement);
     let unknown = matches!(noise, Noise::Unknown);
-    let mut scaled = Scaled { observations: intake.whitened(), sigma, unknown, may_turn: true };
+    let mut scaled = Scaled { observations: whitening.whitened(), sigma, unknown, may_turn: true };
     if let Some(depths) = &options.weight_depths {
         let known = |k: &u32| depths[scaled.observations.source[*k as usize] as usize].is_finite();
         let chosen: Vec<u32> = (0..scaled.observations.n as u32).filter(known).collect();
@@ -57,20 +58,21 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     scaled.observations.independent =
         alone(options.points_per_independent_sample, 1.0) && alone(options.correlation_length, 0.0);
     if unknown && options.rotation_prior.is_some() {
-        // What is known beforehand weighs nothing beside flow of no noise, and how large that is it does not
-        // tell.
+        // What is known beforehand weighs nothing beside flow of no noise, and it does not determine
+        // how large that is.
         let alone = estimate(flow, noise, &MotionOptions { rotation_prior: None, ..options.clone() });
         scaled.take(alone.sigma);
         scaled.may_turn = alone.status == Status::RotationOnly;
     }
     scaled.observations.prior = options.rotation_prior.as_ref().and_then(RotationPrior::information);
     let rng = CounterRng::new(options.random_state);
-    if let Some(turned) = beforehand(&intake, &scaled.observations, (options.robust, scaled.unknown), rng.stream(5)) {
+    if let Some(turned) = beforehand(&whitening, &scaled.observations, (options.robust, scaled.unknown), rng.stream(5))
+    {
         scaled.observations = turned;
     }
     if scaled.unknown
         && options.robust
-        && let Some(rotation) = turning_in_unknown_noise(&scaled.observations, 0.0)
+        && let Some(rotation) = explained_by_rotation_in_unknown_noise(&scaled.observations, 0.0)
     {
         // Nothing is left that noise could be estimated from, but for rounding.
         let (before, left) = (scaled.sigma, (rotation.chi2 / (2 * scaled.observations.n - 3) as f64).sqrt());
@@ -79,41 +81,41 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         return rotation_report(flow, all, all, &rotation, scaled.sigma, options);
     }
     if options.robust {
-        let Some(kept) = exact_consensus(&intake, &mut scaled, rng.stream(1)) else {
+        let Some(kept) = exact_consensus(&whitening, &mut scaled, rng.stream(1)) else {
             return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
         };
         let inner = scaled.observations.subset(&kept.inner);
-        let task = Task { intake: &intake, options, known: Some(&kept), rng };
+        let task = Task { whitening: &whitening, options, known: Some(&kept), rng };
         let found = task.on(&mut scaled, inner);
         let found = with_all_inliers(found, &scaled.observations, &kept);
         doubted(found, &scaled.observations, &kept)
     } else {
         if !scaled.unknown
-            && let Some(rotation) = turning(&scaled.observations)
+            && let Some(rotation) = explained_by_rotation(&scaled.observations)
         {
             return rotation_report(flow, &scaled.observations, &scaled.observations, &rotation, scaled.sigma, options);
         }
         let inliers = scaled.observations.clone();
-        Task { intake: &intake, options, known: None, rng }.on(&mut scaled, inliers)
+        Task { whitening: &whitening, options, known: None, rng }.on(&mut scaled, inliers)
     }
 }
 
-/// The points that obey one motion, with its rotation taken out of their displacements where that makes a
-/// difference to who obeys.
-fn exact_consensus(intake: &Intake<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+/// The inliers of one motion, with its rotation taken out of their displacements where that makes a
+/// difference to which points are inliers.
+fn exact_consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let mut kept = consensus(scaled, rng)?;
     for _ in 0..TURNS {
         let obeying = scaled.observations.subset(&kept.inliers);
-        if !decides(intake, &obeying, &kept.motion) {
+        if !decides(whitening, &obeying, &kept.motion) {
             break;
         }
-        scaled.observations = intake.turned(&scaled.observations, kept.motion.derotation());
+        scaled.observations = whitening.derotated(&scaled.observations, kept.motion.derotation());
         kept = consensus(scaled, rng)?;
     }
     Some(kept)
 }
 
-/// The points that obey one motion, judged by their own errors.
+/// The inliers of one motion, judged by their own errors.
 fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let own = scaled.observations.own();
     scaled.observations.rescale(1.0 / own);

@@ -12,18 +12,18 @@ use nalgebra::{Matrix2, Vector2};
 /// (`together`): a residual alone may be judged as if it did not.
 const INDEPENDENT: f64 = 4.0;
 
-/// Default spacing in correlation lengths. Farther apart, fewer points tell the same motion less surely, and
-/// outliers among them less well; closer ones tell hardly more.
+/// Default spacing in correlation lengths. Farther apart, fewer points determine the motion less well, and
+/// show outliers less well; closer ones add little.
 const SPACED: f64 = 2.0;
 
 /// Least spacing, px, where the field does not know how far its errors go together.
 const LEAST_SPACING: f64 = 8.0;
 
 /// Points closer than this many correlation lengths share so much of their errors that neither chance nor
-/// outliers can be judged with them as if they did not, and they would tell hardly more.
+/// outliers can be judged with them as if they did not, and they would add little.
 const FINEST: f64 = 1.0;
 
-/// Points of a region that a grid which nobody asked for is made finer for.
+/// Points of a region below which the default grid is made finer.
 const WANTED: usize = 30;
 
 /// Which points of a field are taken.
@@ -56,7 +56,7 @@ pub struct FieldPoints {
     /// How far errors of neighbours go together, px: the field's own. For
     /// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions).
     pub correlation_length: f64,
-    /// What the flow of the whole field may have in common, as far as its covariances tell. For
+    /// What the flow of the whole field may have in common, estimated from its covariances. For
     /// [`MotionOptions::common`](crate::motion3d::MotionOptions).
     pub common: CommonErrors,
     /// The spacing that came out of the options, px.
@@ -209,14 +209,14 @@ fn coarse_enough<T>(field: &FlowField<T>, step: usize, options: &FieldOptions) -
 /// (`benchmarks/tables/motion3d_fields.py --only errors`).
 const SHARE: f64 = 0.4;
 
-/// The share of the points whose errors tell how far the factor is off: others have covariances for lack of
+/// The share of the points that determine the scale error: others have large covariances for lack of
 /// texture.
 const BEST: f64 = 0.25;
 
-/// About so many sites of a field are asked.
+/// About so many sites of a field are used.
 const FIELD_SITES: f64 = 4000.0;
 
-/// As far as covariances tell. The factor: by what would be the whole error of the points that tell it
+/// Estimated from covariances. The factor: by the whole error of the points that determine it
 /// best. Of each point, its flow and the covariance of that.
 fn told_by(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> CommonErrors {
     let (mut squares, mut variances) = (Vec::new(), Vec::new());
@@ -233,8 +233,8 @@ fn told_by(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> Common
     CommonErrors { scale, offset: SHARE * median(&mut variances).unwrap_or(0.0).sqrt() }
 }
 
-/// Those of a field, whatever part of it is looked at: a thing that hardly moves in the picture does not
-/// tell by how large a factor flow is off.
+/// Those of a whole field: an object that moves little in the picture does not
+/// determine the scale error of flow.
 pub(crate) fn of_field<T: Real>(field: &FlowField<T>) -> CommonErrors {
     let step = ((field.len() as f64 / FIELD_SITES).sqrt() as usize).max(1);
     let sites = (0..field.height)
@@ -309,13 +309,13 @@ mod tests {
         let found = inside(FieldOptions { region, ..FieldOptions::default() });
         assert!(found.points.len() >= 30 && found.spacing < 10.0, "{} {}", found.points.len(), found.spacing);
         assert!(found.covariances[0] > 0.25);
-        // As many as are wanted in the region, whatever the rest of the field has.
+        // As many as are wanted in the region, regardless of the rest of the field.
         let few = inside(FieldOptions { region, most: Some(12), ..FieldOptions::default() });
         assert!((9..=12).contains(&few.points.len()), "{}", few.points.len());
         let rest = inside(FieldOptions::default()).outside(Rect { x: 10, y: 5, width: 40, height: 30 });
         assert_eq!((rest.points.len(), rest.flow.len(), rest.covariances.len()), (12, 12, 48));
         assert!(rest.points.iter().all(|&[x, y]| !within(region, x as usize, y as usize)));
-        // Asked for, a spacing stays.
+        // A given spacing stays.
         let asked = inside(FieldOptions { region, spacing: Some(10.0), ..FieldOptions::default() });
         assert_eq!((asked.spacing, asked.points.len()), (10.0, 12));
     }

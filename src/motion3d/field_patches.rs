@@ -12,7 +12,7 @@ use crate::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, SamplingGrid, Sta
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 use rayon::prelude::*;
 
-/// Least side of a window, px: six numbers of less are hardly more than those of its pixels.
+/// Least side of a window, px: six numbers of less add little to those of its pixels.
 const LEAST: usize = 8;
 
 /// The share of a window's sites that must be valid, for its middle not to lie beside what is seen of it.
@@ -31,7 +31,7 @@ pub struct FieldPatches {
     pub motion: Vec<[f64; 6]>,
     /// Covariances of the six numbers, 36 values a patch, row by row.
     pub covariances: Vec<f64>,
-    /// What the flow of the whole field may have in common, as far as its covariances tell. For
+    /// What the flow of the whole field may have in common, estimated from its covariances. For
     /// [`MotionOptions::common`](crate::motion3d::MotionOptions).
     pub common: CommonErrors,
 }
@@ -56,8 +56,9 @@ impl FieldPatches {
 /// Pixels whose windows overlap share their noise. The covariance of a patch is that of independent pixels
 /// times the number of its pixels over the number of disjoint windows in it, those of the area `58 l^2` over
 /// which errors of the correlation length `l` are one, their tail beyond the windows included (see
-/// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions)). Flow that is of no second order in a window,
-/// as over an edge in depth, is told by residuals that are larger than the pixels' covariances allow: by as
+/// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions)). Flow that is of no second order in
+/// a window,
+/// as over an edge in depth, shows in residuals that are larger than the pixels' covariances allow: by as
 /// much that of the patch grows.
 ///
 /// # Errors
@@ -178,7 +179,7 @@ struct Sums {
 }
 
 impl Sums {
-    /// The six numbers of a pixel at a distance from the middle; without a covariance that tells, none.
+    /// The six numbers of a pixel at a distance from the middle; `None` without a usable covariance.
     fn add(&mut self, six: &Vector6<f64>, covariance: &Matrix6<f64>, distance: [f64; 2]) {
         let Some(factor) = covariance.cholesky() else { return };
         let l = factor.l();

@@ -1,7 +1,7 @@
-//! From the points that obey one motion to what is told about it.
+//! Fits the motion to the inliers and assembles the result.
 
 use super::diagnostics::report::{of_estimated_noise, report, rotation_report};
-use super::diagnostics::rotation_only::{turning, turning_in_unknown_noise};
+use super::diagnostics::rotation_only::{explained_by_rotation, explained_by_rotation_in_unknown_noise};
 use super::diagnostics::rotation_prior::of_flow_alone;
 use super::diagnostics::solution::Solution;
 use super::diagnostics::status::{Evidence, judge};
@@ -10,14 +10,14 @@ use super::model::observations::{Observations, Scaled};
 use super::model::options::{Method, MotionOptions};
 use super::model::result::{Alternative, MotionEstimate, Status};
 use super::model::statistics::by_chance;
-use super::model::whitening::Intake;
+use super::model::whitening::Whitening;
 use super::robust::{Consensus, Rival, larger};
-use super::solver::covariance::{Plugged, direction_deviation, plugged};
+use super::solver::covariance::{PluginCovariances, direction_deviation, plugged};
 use super::solver::efficient::{Efficient, WeightDepths, beyond_theory, unsolved};
 use super::solver::finite_rotation::{matters, settle, shift};
 use super::solver::likelihood::{Candidate, DISTINCT, Trial, choose, different, minima, near_best, smoothed};
-use super::solver::profile_likelihood::Valley;
-use super::solver::refine::{Effort, Minimum, refine};
+use super::solver::profile_likelihood::ProfileLikelihood;
+use super::solver::refine::{Minimum, StoppingCriteria, refine};
 use super::solver::smoothing::DepthSmoother;
 use crate::math::random::CounterRng;
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ use rayon::prelude::*;
 /// Number of points from which on [`Method::Auto`] smooths depths.
 const SMOOTHED: usize = 30;
 
-/// Times that a minimum is chosen anew once its own rotation is taken out of displacements.
+/// Times that a minimum is chosen again once its own rotation is taken out of displacements.
 const CHOICES: usize = 4;
 
 /// Times that is done where smoothed weights prefer another minimum, and the squared shift, in deviations, by
@@ -33,9 +33,9 @@ const CHOICES: usize = 4;
 const AGAIN: usize = 2;
 const ASTRAY: f64 = 1.0;
 
-/// The points that obey one motion, and what is asked of them.
+/// The inliers of one motion with the options of the fit.
 pub(crate) struct Task<'a, 'b> {
-    pub intake: &'a Intake<'b>,
+    pub whitening: &'a Whitening<'b>,
     pub options: &'a MotionOptions,
     /// What a robust search found.
     pub known: Option<&'a Consensus>,
@@ -48,7 +48,7 @@ struct Solved {
     /// Standard deviation of maximum likelihood's direction, degrees; 0 where it is not known.
     deviation: f64,
     low: bool,
-    /// Whether the covariance tells the shape of what is not known.
+    /// Whether the covariance describes the shape of the confidence region.
     told: bool,
     undecided: Option<Alternative>,
 }
@@ -56,12 +56,12 @@ struct Solved {
 impl Task<'_, '_> {
     /// Estimates on the `inliers` of all points.
     pub fn on(&self, scaled: &mut Scaled, mut inliers: Observations) -> MotionEstimate {
-        let flow = self.intake.flow;
+        let flow = self.whitening.flow;
         let mut found = self.begin(&inliers, scaled.unknown);
         let Some(&first) = found.first() else {
             return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
         };
-        settle(self.intake, &mut scaled.observations, &mut inliers, &mut found, &first, scaled.unknown);
+        settle(self.whitening, &mut scaled.observations, &mut inliers, &mut found, &first, scaled.unknown);
         let cost = found[0].equations.cost - inliers.pulled(&found[0].motion.w());
         if let Some(told) = self.without_translation(scaled, &mut inliers, cost) {
             return told;
@@ -69,22 +69,25 @@ impl Task<'_, '_> {
         if scaled.unknown {
             let sigma = (cost / inliers.n.saturating_sub(5).max(1) as f64).sqrt();
             rescaled(scaled, &mut inliers, sigma);
-            found = found.iter().map(|minimum| refine(&inliers, minimum.motion, None, Effort::of(inliers.n))).collect();
+            found = found
+                .iter()
+                .map(|minimum| refine(&inliers, minimum.motion, None, StoppingCriteria::of(inliers.n)))
+                .collect();
         }
         let (mut candidates, made) = self.chosen(scaled, &mut inliers, found);
         let mut solved = self.solved(&inliers, &candidates, made);
         for round in 0..=AGAIN {
-            if shift(self.intake, &inliers, &solved.solution.motion) <= ASTRAY {
+            if shift(self.whitening, &inliers, &solved.solution.motion) <= ASTRAY {
                 break;
             }
-            // Of what has another rotation taken out nothing is told.
+            // Undetermined: the points were derotated about a different rotation.
             if round == AGAIN {
                 solved.told = false;
                 break;
             }
             (candidates, solved) = self.solved_there(scaled, &mut inliers, &candidates, &solved.solution.motion);
         }
-        self.widen(&mut solved.solution, scaled, &inliers, candidates[0].minimum.equations.cost);
+        self.inflate(&mut solved.solution, scaled, &inliers, candidates[0].minimum.equations.cost);
         solved.undecided = solved.undecided.or_else(|| contested(&candidates, &solved.solution));
         if solved.solution.contradicted(&inliers) {
             solved.undecided = Some(of_flow_alone(&inliers, &solved.solution.motion));
@@ -98,7 +101,7 @@ impl Task<'_, '_> {
         let likelihood = (*candidates[0].motion(), candidates[0].minimum.equations.behind);
         let unknown = scaled.unknown;
         let evidence = Evidence { likelihood, deviation, low, told, unknown, rivals, undecided };
-        judge(self.intake, &inliers, &mut solution, &evidence, self.rng.stream(4));
+        judge(self.whitening, &inliers, &mut solution, &evidence, self.rng.stream(4));
         report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
     }
 
@@ -107,15 +110,15 @@ impl Task<'_, '_> {
         match (&self.options.initial, self.known) {
             (Some(initial), _) => {
                 let initial = Motion::new(initial.translation, initial.rotation);
-                vec![refine(inliers, initial, None, Effort::FULL)]
+                vec![refine(inliers, initial, None, StoppingCriteria::FULL)]
             }
             (None, None) => minima(inliers, unknown, self.rng.stream(2)),
             (None, Some(known)) => again(inliers, known),
         }
     }
 
-    /// What is told where chance explains what a rotation alone leaves; `cost` is what the best motion leaves
-    /// of the flow. (Of all points in known noise that was asked before any motion was looked for.)
+    /// The report where chance explains what a rotation alone leaves; `cost` is what the best motion leaves
+    /// of the flow. (Of all points in known noise this was tested before any motion was searched.)
     fn without_translation(
         &self,
         scaled: &mut Scaled,
@@ -125,16 +128,16 @@ impl Task<'_, '_> {
         let rotation = if !scaled.may_turn {
             return None;
         } else if scaled.unknown {
-            let rotation = turning_in_unknown_noise(inliers, cost)?;
+            let rotation = explained_by_rotation_in_unknown_noise(inliers, cost)?;
             let left = rotation.chi2 - inliers.pulled(&rotation.rotation);
             let sigma = (left / (2 * inliers.n - 3) as f64).sqrt();
             rotation.in_units(rescaled(scaled, inliers, sigma))
         } else if self.options.robust {
-            turning(inliers)?
+            explained_by_rotation(inliers)?
         } else {
             return None;
         };
-        Some(rotation_report(self.intake.flow, &scaled.observations, inliers, &rotation, scaled.sigma, self.options))
+        Some(rotation_report(self.whitening.flow, &scaled.observations, inliers, &rotation, scaled.sigma, self.options))
     }
 
     /// The minima in the order of preference; the first has its own rotation taken out of the points.
@@ -147,15 +150,15 @@ impl Task<'_, '_> {
         let (mut candidates, mut made) = self.preferred(inliers, &found);
         for _ in 0..CHOICES {
             let lead = candidates[0].minimum;
-            if !matters(self.intake, inliers, &lead.motion) {
+            if !matters(self.whitening, inliers, &lead.motion) {
                 return (candidates, made);
             }
-            settle(self.intake, &mut scaled.observations, inliers, &mut found, &lead, false);
+            settle(self.whitening, &mut scaled.observations, inliers, &mut found, &lead, false);
             (candidates, made) = self.preferred(inliers, &found);
         }
-        // Each of two is preferred with the rotation of the other taken out: that whose own is out now is
-        // told.
-        if let Some(own) = candidates.iter().position(|other| !matters(self.intake, inliers, other.motion())) {
+        // Each of two is preferred with the rotation of the other taken out: the one whose own is out now is
+        // returned.
+        if let Some(own) = candidates.iter().position(|other| !matters(self.whitening, inliers, other.motion())) {
             candidates[..=own].rotate_right(1);
         }
         (candidates, made)
@@ -173,7 +176,7 @@ impl Task<'_, '_> {
         let mut found: Vec<Minimum> = candidates.iter().map(|candidate| candidate.minimum).collect();
         let away = |minimum: &&Minimum| minimum.motion.angle_to(preferred);
         if let Some(lead) = found.iter().min_by(|a, b| away(a).total_cmp(&away(b))).copied() {
-            settle(self.intake, &mut scaled.observations, inliers, &mut found, &lead, false);
+            settle(self.whitening, &mut scaled.observations, inliers, &mut found, &lead, false);
         }
         let (candidates, made) = self.chosen(scaled, inliers, found);
         let solved = self.solved(inliers, &candidates, made);
@@ -193,7 +196,7 @@ impl Task<'_, '_> {
         DepthSmoother::new(inliers, self.options.smoother, self.rng.stream(3))
     }
 
-    /// Maximum likelihood's motion or that of the smoothed weights, which are asked as well where maximum
+    /// Maximum likelihood's motion or that of the smoothed weights, which are also solved where maximum
     /// likelihood's theory does not hold.
     fn solved(&self, inliers: &Observations, candidates: &[Candidate], made: Option<DepthSmoother>) -> Solved {
         let chosen = candidates[0];
@@ -206,8 +209,8 @@ impl Task<'_, '_> {
         let low = plugged.is_none();
         let several = near_best(candidates, inliers.n).len() > 1;
         let Minimum { motion, tangent, .. } = &chosen.minimum;
-        let valley = Valley { observations: inliers, motion, tangent };
-        let beyond = |plugged: &Plugged| {
+        let valley = ProfileLikelihood { observations: inliers, motion, tangent };
+        let beyond = |plugged: &PluginCovariances| {
             beyond_theory(inliers, &chosen.minimum, plugged) || valley.bent(&plugged.likelihood) > 0
         };
         let astray = plugged.as_ref().is_some_and(beyond);
@@ -221,7 +224,7 @@ impl Task<'_, '_> {
             undecided = preferred_to(best, &chosen, plugged.as_ref()).or(undecided);
         }
         let mut improved = improved.filter(|_| wanted || low || astray);
-        // Of maximum likelihood alone nothing is told beyond its theory.
+        // Maximum likelihood alone is undetermined beyond its theory.
         let mut told = plugged.as_ref().is_none_or(|plugged| valley.bent(&plugged.likelihood) == 0);
         if let Some(best) = &mut improved {
             (best.covariance, told) = best.lengthened(inliers, || self.smoother(inliers));
@@ -239,30 +242,30 @@ impl Task<'_, '_> {
         Solved { solution, deviation, low, told, undecided }
     }
 
-    /// Takes into account what a linear theory of independent points of known noise that all obey leaves out.
+    /// Takes into account what a linear theory of independent inliers of known noise leaves out.
     /// `cost`: what maximum likelihood leaves.
-    fn widen(&self, solution: &mut Solution, scaled: &Scaled, inliers: &Observations, cost: f64) {
+    fn inflate(&self, solution: &mut Solution, scaled: &Scaled, inliers: &Observations, cost: f64) {
         if let Some(known) = self.known {
             solution.among_strays(&scaled.observations, known, self.options.weight_depths.is_some());
         }
-        let common = solution.in_common(inliers, self.intake.flow, &self.options.common);
+        let common = solution.systematic_effect(inliers, self.whitening.flow, &self.options.common);
         let length = self.options.correlation_length.filter(|length| *length > 0.0);
-        solution.go_together(inliers, self.intake.flow, length);
+        solution.add_correlation(inliers, self.whitening.flow, length);
         let wider = match (scaled.unknown, self.known) {
             (true, known) => of_estimated_noise(inliers.n, known.is_some()),
-            // The residuals tell how large errors are that go together.
+            // The residuals determine how large correlated errors are.
             (false, _) if length.is_some() => 1.0,
             (false, None) => misfit(inliers, cost),
-            // What strays leave among residuals that are cut off is accounted for.
+            // What outliers leave among truncated residuals is accounted for.
             (false, Some(_)) => larger(&scaled.observations, &solution.motion),
         };
-        solution.widen(wider, common);
+        solution.inflate(wider, common);
     }
 }
 
 /// Another minimum that is preferred with the rotation taken out that belongs to the first, as that is with
-/// its own; or one that is where depths behind the camera count only as far as noise does not explain them:
-/// of depths that are hardly any, half are behind it.
+/// its own; or one that is where depths behind the camera count only where noise does not explain them:
+/// of depths near 0, half are behind it.
 fn contested(candidates: &[Candidate], solution: &Solution) -> Option<Alternative> {
     let first = &candidates[0];
     let preferred = candidates.get(1).filter(|other| other.cost < first.cost);
@@ -273,8 +276,8 @@ fn contested(candidates: &[Candidate], solution: &Solution) -> Option<Alternativ
     Some(Alternative { motion: *other.motion(), excess: other.cost - first.cost })
 }
 
-/// What residuals are larger by, in variance, than the noise that was told, where chance does not explain it:
-/// whatever the model leaves out (noise larger than told, points that do not obey, a minimum that was
+/// What residuals are larger by, in variance, than the given noise, where chance does not explain it:
+/// what the model leaves out (larger noise than given, outliers, a minimum that was
 /// missed), the motion is off by as much (R. Birge 1932).
 fn misfit(inliers: &Observations, cost: f64) -> f64 {
     let free = inliers.n.saturating_sub(5) as f64 / inliers.points_per_independent_sample;
@@ -283,7 +286,7 @@ fn misfit(inliers: &Observations, cost: f64) -> f64 {
 
 /// The smoothed weights' solution where it is not the minimum that maximum likelihood chose: then either may
 /// be true.
-fn preferred_to(best: &Efficient, chosen: &Candidate, plugged: Option<&Plugged>) -> Option<Alternative> {
+fn preferred_to(best: &Efficient, chosen: &Candidate, plugged: Option<&PluginCovariances>) -> Option<Alternative> {
     let deviation = plugged.map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
     let deviation = deviation.max(direction_deviation(&best.covariance));
     let apart = best.motion.angle_to(chosen.motion()).to_degrees() > DISTINCT * deviation;
@@ -292,14 +295,16 @@ fn preferred_to(best: &Efficient, chosen: &Candidate, plugged: Option<&Plugged>)
 
 /// The minimum that a robust search led to, and those that other minima for the same points lead to.
 ///
-/// Among many strays that motion is the likeliest as it is.
+/// Among many outliers that motion is already the likeliest.
 fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
     if known.many {
-        return vec![refine(inliers, known.motion, None, Effort::NONE)];
+        return vec![refine(inliers, known.motion, None, StoppingCriteria::NONE)];
     }
     let others = known.rivals.iter().filter(|rival| !rival.others).map(|rival| rival.motion);
     let motions: Vec<Motion> = std::iter::once(known.motion).chain(others).collect();
-    different(motions.into_par_iter().map(|motion| refine(inliers, motion, None, Effort::of(inliers.n))).collect())
+    different(
+        motions.into_par_iter().map(|motion| refine(inliers, motion, None, StoppingCriteria::of(inliers.n))).collect(),
+    )
 }
 
 /// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied

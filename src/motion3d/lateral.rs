@@ -16,7 +16,8 @@
 use crate::error::{Error, Result};
 use nalgebra::{Matrix2, Vector2};
 
-/// Times that the scatter of depths is asked along the direction found with the one before: it converges at
+/// Times that the scatter of depths is computed along the direction found with the one before: it converges
+/// at
 /// once unless noise hides it.
 const ROUNDS: usize = 8;
 

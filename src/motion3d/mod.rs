@@ -19,6 +19,11 @@
 //! `u` and `w` are the motion of the scene relative to the camera: `X_dot = u + w x X`; the camera's own
 //! velocity is `-u`. Camera axes: x right, y down, z forward. Inverse depths are in units of `|u|` per frame.
 //!
+//! The data pass `model` (rows of unit noise), `robust` (outliers; it searches with `solver` and `kernels`),
+//! `fit` (minima and weights, by `solver`) and `diagnostics` (covariance, status, report); `estimate` is the entry
+//! point. `patches` does the same for affine flow, `field` and `field_patches` take points and windows of flow
+//! fields, `bound` predicts covariances, `lateral` is the closed form without rotation.
+//!
 //! ```
 //! use jacoflow::motion3d::{Flow, Method, Motion, MotionOptions, Noise, Placement, Status, estimate_motion};
 //! # fn main() -> jacoflow::Result<()> {

@@ -1,8 +1,9 @@
 //! Which directions explain the flow as well as the estimate does.
 //!
 //! Two directions leave different components of the noise as residuals: across lines that are turned by `phi`
-//! against each other, the difference of `J` has the variance `4 sum sin^2 phi` whatever is true. Where
-//! depths are mostly noise, that hides the truth behind a lower minimum. Two things do not fluctuate so: the
+//! against each other, the difference of `J` has the variance `4 sum sin^2 phi` in any case. Where
+//! depths are mostly noise, that hides the truth behind a lower minimum. Two quantities do not fluctuate so:
+//! the
 //! estimating equation, which at the true direction is zero but for the noise of its own few unknowns,
 //! however wrong its weights; and the depth map, which a wrong motion makes rough.
 
@@ -12,7 +13,7 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::Smoother;
 use crate::motion3d::model::rows::tangents;
-use crate::motion3d::model::whitening::Intake;
+use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::finite_rotation::{WANDERED, afresh};
 use crate::motion3d::solver::likelihood::minima;
 use crate::motion3d::solver::smoothing::DepthSmoother;
@@ -35,7 +36,7 @@ const AS_SMOOTH: f64 = 1.0;
 /// Most doubtful directions whose depth maps are compared, the likeliest by what else is known of them.
 pub(crate) const COMPARED: usize = 12;
 
-/// Angles to the estimate, degrees, beyond which a direction is asked for.
+/// Angles to the estimate, degrees, beyond which a direction is tested.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Farther {
     /// Directions whose residuals are as small.
@@ -46,11 +47,11 @@ pub(crate) struct Farther {
 
 /// A direction with the rotation and the sign that suit it best.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Asked {
+pub(crate) struct TestedDirection {
     pub motion: Motion,
     /// `J` and the depths behind the camera.
     pub cost: f64,
-    /// From the estimate's, whatever the sign, degrees.
+    /// From the estimate's, of either sign, degrees.
     angle: f64,
 }
 
@@ -66,7 +67,7 @@ pub(crate) fn plausible_beyond(
 ) -> bool {
     let searched = &*at_most(observations, most, rng);
     let first = motions[0].u();
-    let known: Vec<Asked> = motions.iter().filter_map(|motion| ask(searched, &motion.u(), &first)).collect();
+    let known: Vec<TestedDirection> = motions.iter().filter_map(|motion| ask(searched, &motion.u(), &first)).collect();
     let Some(best) = known.iter().min_by(|a, b| a.cost.total_cmp(&b.cost)) else { return false };
     let limit = best.cost + PLAUSIBLE;
     let widest = limit + CHANCE * 2.0 * (searched.n as f64).sqrt();
@@ -84,17 +85,17 @@ pub(crate) fn plausible_beyond(
     }
     doubts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     doubts.truncate(COMPARED);
-    let among = |asked: &[Asked]| asked.iter().map(|asked| (searched, *asked)).collect::<Vec<_>>();
+    let among = |asked: &[TestedDirection]| asked.iter().map(|asked| (searched, *asked)).collect::<Vec<_>>();
     as_likely(&among(&known), &among(&doubts), rng.stream(1))
 }
 
-pub(crate) fn ask(observations: &Observations, u: &Vector3<f64>, first: &Vector3<f64>) -> Option<Asked> {
+pub(crate) fn ask(observations: &Observations, u: &Vector3<f64>, first: &Vector3<f64>) -> Option<TestedDirection> {
     let (w, cost) = best_rotation(observations, u)?;
     let signs = [Motion::of(u, &w), Motion::of(&-u, &w)];
     let behind = signs.map(|motion| equations(observations, &motion, &tangents(&motion.u()), None).behind);
     let better = usize::from(behind[1] < behind[0]);
     let angle = first.cross(u).norm().atan2(first.dot(u).abs()).to_degrees();
-    Some(Asked { motion: signs[better], cost: cost + behind[better], angle })
+    Some(TestedDirection { motion: signs[better], cost: cost + behind[better], angle })
 }
 
 /// Standard deviation of the difference of two directions' `J` by chance, `2 sqrt(sum sin^2 phi)`.
@@ -111,10 +112,15 @@ pub(crate) fn fluctuation(observations: &Observations, one: &Motion, other: &Mot
 
 /// Whether one of the doubtful directions has depths as smooth as those of the known motions, and is
 /// consistent with the estimating equation; each with the points as it sees them.
-pub(crate) fn as_likely(known: &[(&Observations, Asked)], doubts: &[(&Observations, Asked)], rng: CounterRng) -> bool {
+pub(crate) fn as_likely(
+    known: &[(&Observations, TestedDirection)],
+    doubts: &[(&Observations, TestedDirection)],
+    rng: CounterRng,
+) -> bool {
     let Some((points, _)) = known.first().filter(|_| !doubts.is_empty()) else { return false };
     let mut smoother = DepthSmoother::new(points, Smoother::Auto, rng);
-    let cost = |(points, asked): &(&Observations, Asked)| asked.cost + smoother.cost(&depths(points, &asked.motion));
+    let cost =
+        |(points, asked): &(&Observations, TestedDirection)| asked.cost + smoother.cost(&depths(points, &asked.motion));
     let limit = known.iter().map(cost).fold(f64::INFINITY, f64::min) + AS_SMOOTH * (points.n as f64).sqrt();
     let smooth: Vec<_> = doubts.iter().filter(|doubt| cost(doubt) < limit).collect();
     smooth.into_iter().any(|(points, asked)| consistent(points, &asked.motion, &mut smoother))
@@ -137,7 +143,7 @@ pub(crate) const ROUNDS: usize = 4;
 /// Whether, for `most` of the points, a direction that is `farther` from the estimate's is as plausible, each
 /// with its own rotation taken out.
 pub(crate) fn plausible_less_turned(
-    intake: &Intake<'_>,
+    whitening: &Whitening<'_>,
     inliers: &Observations,
     motion: &Motion,
     farther: Farther,
@@ -148,34 +154,38 @@ pub(crate) fn plausible_less_turned(
     if !own.displaced || own.turn.is_none() {
         return false;
     }
-    let Some(fresh) = afresh(intake, own) else { return false };
+    let Some(fresh) = afresh(whitening, own) else { return false };
     let wandered = fresh.turn.is_some_and(|turn| (turn.rotation - motion.w()).norm() > WANDERED);
     if !wandered {
         return false;
     }
     let u = motion.u();
     let Some(best) = ask(own, &u, &u) else { return false };
-    let limit = |asked: &Asked| best.cost + PLAUSIBLE + CHANCE * fluctuation(own, motion, &asked.motion);
-    let apart = |asked: &Asked| asked.motion.angle_to(motion).to_degrees() > farther.chance;
+    let limit = |asked: &TestedDirection| best.cost + PLAUSIBLE + CHANCE * fluctuation(own, motion, &asked.motion);
+    let apart = |asked: &TestedDirection| asked.motion.angle_to(motion).to_degrees() > farther.chance;
     let mut asked = evaluate(|u| ask(&fresh, u, u));
     asked.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     asked.retain(|asked| apart(asked) && asked.cost < limit(asked));
     asked.truncate(COMPARED);
     let found = minima(&fresh, true, rng.stream(1));
     asked.extend(found.iter().filter_map(|minimum| ask(&fresh, &minimum.motion.u(), &u)));
-    let exact = asked.into_par_iter().filter_map(|asked| exactly(intake, &fresh, asked));
-    let exact: Vec<(Observations, Asked)> =
+    let exact = asked.into_par_iter().filter_map(|asked| exactly(whitening, &fresh, asked));
+    let exact: Vec<(Observations, TestedDirection)> =
         exact.filter(|(_, asked)| apart(asked) && asked.cost < limit(asked)).collect();
-    let doubts: Vec<(&Observations, Asked)> = exact.iter().map(|(points, asked)| (points, *asked)).collect();
+    let doubts: Vec<(&Observations, TestedDirection)> = exact.iter().map(|(points, asked)| (points, *asked)).collect();
     as_likely(&[(own, best)], &doubts, rng.stream(2))
 }
 
 /// A direction with the rotation that suits it best, which is taken out of the points.
-pub(crate) fn exactly(intake: &Intake<'_>, fresh: &Observations, mut asked: Asked) -> Option<(Observations, Asked)> {
+pub(crate) fn exactly(
+    whitening: &Whitening<'_>,
+    fresh: &Observations,
+    mut asked: TestedDirection,
+) -> Option<(Observations, TestedDirection)> {
     let u = asked.motion.u();
     let mut turned = None;
     for _ in 0..ROUNDS {
-        let next = intake.turned(fresh, asked.motion.derotation());
+        let next = whitening.derotated(fresh, asked.motion.derotation());
         asked = ask(&next, &u, &u)?;
         turned = Some(next);
     }

@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::math::Real;
 use crate::motion3d::field::measured;
 use crate::motion3d::model::camera::Intrinsics;
-use crate::motion3d::model::derotation::{HalfTurn, HalfWay};
+use crate::motion3d::model::derotation::{Derotation, MidpointDepth};
 use crate::motion3d::model::input::Placement;
 use crate::motion3d::model::observations::Row;
 use crate::motion3d::model::result::{CommonEffect, UncertainMotion};
@@ -93,7 +93,7 @@ impl Rates {
     }
 
     /// The same from a point's own flow, and its residual across the epipolar line in units of noise.
-    fn own(&self, row: &Row, half_way: HalfWay) -> [f64; 3] {
+    fn own(&self, row: &Row, half_way: MidpointDepth) -> [f64; 3] {
         let (t, d) = (row.g * self.u, row.f - row.r * self.w);
         let s2 = t.norm_squared();
         let nu = t.dot(&d) / s2;
@@ -110,7 +110,7 @@ pub struct ContactMap {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// `-1 / (nu u_z)`, frames, row by row: positive where something comes nearer, infinite where nothing
+    /// `-1 / (nu u_z)`, frames, row by row: positive where a point comes nearer, infinite where none
     /// does, NaN where the field is not valid.
     pub contact: Vec<f64>,
     /// Their standard deviations, frames, by first order from those of the site's own flow and of the motion.
@@ -120,7 +120,7 @@ pub struct ContactMap {
     pub residual: Vec<f64>,
 }
 
-/// The time to contact of whatever each site of a field shows, if it obeys the motion; counted from half way
+/// The time to contact of the point at each site of a field, if it has the motion; counted from half way
 /// between the frames with [`Placement::Midpoint`].
 ///
 /// Where the motion has no translation all times are infinite.
@@ -137,7 +137,7 @@ pub fn contact_map<T: Real>(
     let (rates, motion) = (Rates::new(known), &known.motion);
     let turning = motion.translation[0].is_nan() && motion.rotation[0].is_finite();
     let turn = (placement == Placement::Midpoint).then(|| motion.derotation());
-    let half_way = turn.filter(|_| !turning).map_or_else(HalfWay::default, |turn| turn.half_way(&motion.u()));
+    let half_way = turn.filter(|_| !turning).map_or_else(MidpointDepth::default, |turn| turn.half_way(&motion.u()));
     let at = |site: usize| -> [f64; 3] {
         let Some(row) = site_row(field, camera, turn.as_ref(), site) else { return [f64::NAN; 3] };
         if turning {
@@ -159,7 +159,7 @@ pub fn contact_map<T: Real>(
 
 /// A site's whitened flow, as a displacement with the rotation taken out of it if there is a `turn`; `None`
 /// where it is not valid.
-fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, turn: Option<&HalfTurn>, site: usize) -> Option<Row> {
+fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, turn: Option<&Derotation>, site: usize) -> Option<Row> {
     if !field.status[site].is_valid() || field.status[site] == Status::Inconsistent {
         return None;
     }
@@ -217,7 +217,7 @@ mod tests {
         let motion = Motion::new([0.0, 0.0, -1.0], [0.001, -0.002, 0.003]);
         let mut field = wall(&motion, 0.02, &camera);
         field.status[5] = Status::Inconsistent;
-        // Something that goes its own way.
+        // An object with another motion.
         field.motion[100] += 5.0;
         let mut covariance = [[0.0; 5]; 5];
         let map = |motion: Motion, covariance: [[f64; 5]; 5]| {

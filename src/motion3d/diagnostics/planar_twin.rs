@@ -1,11 +1,11 @@
-//! The flow of one plane, whatever the motion.
+//! The flow of one plane under any motion, and the second motion that explains it.
 //!
 //! Points of a plane `nu = n . eta` move by `(u n^t + [w]x) eta` relative to the camera: their flow is `f = G
 //! A eta` with a matrix `A` that is known up to a multiple of the unit matrix, eight numbers (H.
 //! Longuet-Higgins 1984). Over a whole frame it is `G A eta / (1 + a_3 . eta)`, `a_3` being the last row of
 //! `A`: a homography.
 //!
-//! Whether the flow is a plane's is asked of the flow itself: depths at an estimated motion depart from a
+//! Whether the flow is a plane's is tested on the flow itself: depths at an estimated motion depart from a
 //! plane's by what the motion is off, and by more than their own noise where that is small along the epipolar
 //! lines.
 
@@ -15,8 +15,8 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Row};
 use crate::motion3d::model::rows::Rows;
 use crate::motion3d::model::statistics::{RARE, by_chance, chi2_deviation};
-use crate::motion3d::model::whitening::Intake;
-use crate::motion3d::solver::refine::{Effort, refine};
+use crate::motion3d::model::whitening::Whitening;
+use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use crate::motion3d::solver::starts::at_most;
 use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, SymmetricEigen, Vector2, Vector3};
 use std::borrow::Cow;
@@ -112,7 +112,7 @@ fn step(points: &[Point], a: &Matrix3<f64>, ends: bool) -> (Matrix3<f64>, usize)
         normal += slopes.transpose() * slopes;
         right += slopes.transpose() * (point.flow - flow);
     }
-    // In units of each number's own information; points on a line or at few places do not tell of all.
+    // In units of each number's own information; points on a line or at few places do not determine all.
     let scale = normal.diagonal().map(|own| if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 });
     let scaled = SMatrix::<f64, NUMBERS, NUMBERS>::from_fn(|i, j| normal[(i, j)] * scale[i] * scale[j]);
     let eigen = SymmetricEigen::<f64, nalgebra::Const<NUMBERS>>::new(scaled);
@@ -130,31 +130,31 @@ fn step(points: &[Point], a: &Matrix3<f64>, ends: bool) -> (Matrix3<f64>, usize)
 /// Times that a plane's other rotation is taken out of displacements.
 pub(crate) const TURNS: usize = 5;
 
-/// Points that are asked first whether they are a plane.
+/// Points that are tested first for a plane.
 pub(crate) const FEW: usize = 1000;
 
 /// The other motion of a scene that is one plane `nu = n . eta`: `(n / |n|, w + n x u)`, with the plane `|n|
 /// u`.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Twin {
+pub(crate) struct PlanarTwin {
     pub motion: Motion,
     /// Squared depths behind the camera, in units of their deviation, that it has, and how far it is from a
     /// known rotation.
     pub behind: f64,
 }
 
-/// The other motion where the flow is that of one plane as far as its noise lets tell; `None` where it is
+/// The other motion where the flow is that of one plane within its noise; `None` where it is
 /// not, or where both motions are the same.
 ///
 /// `distinct`: least angle between both directions, rad, that is no mere error of the estimate; `unknown`:
 /// the noise is what the motion leaves.
-pub(crate) fn twin(
-    intake: &Intake<'_>,
+pub(crate) fn planar_twin(
+    whitening: &Whitening<'_>,
     observations: &Observations,
     motion: &Motion,
     distinct: f64,
     unknown: bool,
-) -> Option<Twin> {
+) -> Option<PlanarTwin> {
     // The ratio of two independent variances, one of twice as many numbers as the other, deviates by so much
     // more than one alone.
     let usual = if unknown { 3.0f64.sqrt() } else { 1.0 };
@@ -186,14 +186,14 @@ pub(crate) fn twin(
     if n.norm() <= 0.0 || bent(observations, &s2, rest) {
         return None;
     }
-    let (other, seen) = other_motion(intake, observations, motion, &n)?;
+    let (other, seen) = other_motion(whitening, observations, motion, &n)?;
     let behind = |motion: &Motion| -> f64 {
         let at = depths(&seen, motion);
         let behind: f64 = (0..seen.n).map(|k| at.nu[k].min(0.0).powi(2) * at.s2[k]).sum();
         behind + seen.pulled(&motion.w())
     };
     let angle = other.u().cross(&u).norm().atan2(other.u().dot(&u).abs());
-    let signs = [other, other.reversed()].map(|motion| Twin { motion, behind: behind(&motion) });
+    let signs = [other, other.reversed()].map(|motion| PlanarTwin { motion, behind: behind(&motion) });
     let better = if signs[1].behind < signs[0].behind { signs[1] } else { signs[0] };
     (angle > distinct).then_some(better)
 }
@@ -214,7 +214,7 @@ pub(crate) fn place(observations: &Observations, motion: &Motion, k: usize, nu: 
 /// The other motion of a plane, and the points as it sees them: displacements with its own rotation taken
 /// out, where another one was.
 pub(crate) fn other_motion<'a>(
-    intake: &Intake<'_>,
+    whitening: &Whitening<'_>,
     observations: &'a Observations,
     motion: &Motion,
     n: &Vector3<f64>,
@@ -222,7 +222,7 @@ pub(crate) fn other_motion<'a>(
     let Some(turn) = observations.turn else {
         let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&motion.u())));
         // What the estimate is off by is in the plane, too.
-        let other = refine(observations, other, None, Effort::FULL).motion;
+        let other = refine(observations, other, None, StoppingCriteria::FULL).motion;
         return Some((other, Cow::Borrowed(observations)));
     };
     // In the axes half way the translation is V' u and rotations are V' w.
@@ -231,14 +231,14 @@ pub(crate) fn other_motion<'a>(
     let mut other = Motion::of(&(back * n).normalize(), &w);
     let mut seen = observations.clone();
     for _ in 0..TURNS {
-        seen = intake.turned(&seen, other.derotation());
-        other = refine(&seen, other, None, Effort::FULL).motion;
+        seen = whitening.derotated(&seen, other.derotation());
+        other = refine(&seen, other, None, StoppingCriteria::FULL).motion;
     }
     Some((other, Cow::Owned(seen)))
 }
 
 /// Whether a curved surface explains the depths better than a plane by more than chance and the error of the
-/// motion would have it: all depths together tell that with less certainty.
+/// motion would have it: the sum over all depths is less sensitive.
 ///
 /// `rest`: what a plane leaves of each depth.
 pub(crate) fn bent(observations: &Observations, s2: &[f64], rest: impl Fn(usize) -> f64) -> bool {
@@ -266,10 +266,10 @@ pub(crate) fn bent(observations: &Observations, s2: &[f64], rest: impl Fn(usize)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion3d::model::derotation::HalfTurn;
+    use crate::motion3d::model::derotation::Derotation;
     use crate::motion3d::model::input::{Flow, Noise, Placement};
     use crate::motion3d::model::motion::Motion;
-    use crate::motion3d::model::whitening::Intake;
+    use crate::motion3d::model::whitening::Whitening;
     use crate::motion3d::tests::scenes::{Scene, W};
 
     const SLANT: [f64; 3] = [0.9, 0.3, -0.2];
@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn a_homography_is_the_displacement_of_a_plane() {
         let motion = Motion::new([0.6, 0.2, 0.75], [0.1, -0.05, 0.2]);
-        let turn = HalfTurn::new(&motion.w());
+        let turn = Derotation::new(&motion.w());
         let points: Vec<[f64; 2]> =
             (0..100).map(|k| [f64::from(k % 10) * 0.1 - 0.45, f64::from(k / 10) * 0.1 - 0.45]).collect();
         let seen = |&[x, y]: &[f64; 2]| {
@@ -303,10 +303,10 @@ mod tests {
         };
         let flow: Vec<[f64; 2]> = points.iter().map(seen).collect();
         let flow = Flow::Plane { points: &points, flow: &flow, camera: None };
-        let intake = Intake::new(&flow, &Noise::Sigma(1e-3), Placement::Midpoint);
-        let start = intake.whitened();
-        for taken in [turn, motion.derotation(), HalfTurn::new(&Vector3::new(0.0, 0.1, -0.1))] {
-            let fit = PlaneFlow::fit(&intake.turned(&start, taken)).unwrap();
+        let whitening = Whitening::new(&flow, &Noise::Sigma(1e-3), Placement::Midpoint);
+        let start = whitening.whitened();
+        for taken in [turn, motion.derotation(), Derotation::new(&Vector3::new(0.0, 0.1, -0.1))] {
+            let fit = PlaneFlow::fit(&whitening.derotated(&start, taken)).unwrap();
             assert!(fit.chi2 < 1e-12 && fit.free == 192.0, "{}", fit.chi2);
         }
     }

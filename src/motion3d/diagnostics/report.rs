@@ -1,13 +1,13 @@
-//! From a solution on the inliers to what is told about every point that was given.
+//! Assembles the result for all given points from a solution on the inliers.
 
 use super::contact::{Rates, Slopes};
-use super::correlated_noise::turning;
+use super::correlated_noise::correlated_rotation_covariance;
 use super::rotation_only::RotationOnly;
 use super::rotation_prior::rotation_contradiction;
 use super::solution::{Solution, rotation_shift};
 use crate::motion3d::kernels::{Depths, depths, equations};
 use crate::motion3d::model::camera::to_plane;
-use crate::motion3d::model::derotation::HalfWay;
+use crate::motion3d::model::derotation::MidpointDepth;
 use crate::motion3d::model::input::Flow;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
@@ -19,12 +19,12 @@ use crate::motion3d::solver::covariance::{direction_deviation, plugged};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-/// Fewest points that a thread is worth its while for.
+/// Fewest points for which a thread pays.
 const TOGETHER: usize = 1000;
 
 /// From inverse depths in the rows to those half way in time.
-fn half_way(points: &Observations, motion: &Motion) -> HalfWay {
-    points.turn.map_or_else(HalfWay::default, |turn| turn.half_way(&motion.u()))
+fn half_way(points: &Observations, motion: &Motion) -> MidpointDepth {
+    points.turn.map_or_else(MidpointDepth::default, |turn| turn.half_way(&motion.u()))
 }
 
 /// Puts the results of usable points where they came from; others stay as they are.
@@ -34,7 +34,7 @@ fn scatter(to: &mut [f64], observations: &Observations, from: impl Fn(usize) -> 
     }
 }
 
-/// Everything that is told about a motion.
+/// The whole result of a motion.
 pub(crate) fn report(
     flow: &Flow<'_>,
     all: &Observations,
@@ -122,7 +122,7 @@ fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations,
     out.approach = (rate, (u_z * u_z / weights + rates.variance(rate, &slopes.times(1.0 / weights))).sqrt());
 }
 
-/// What is told about a camera that only turns, or stands still.
+/// The result of a camera that only rotates, or stands still.
 pub(crate) fn rotation_report(
     flow: &Flow<'_>,
     all: &Observations,
@@ -135,7 +135,7 @@ pub(crate) fn rotation_report(
     let moved = rotation_shift(inliers, &rotation.covariance) * to_plane(flow.camera());
     let mut covariance = rotation.covariance;
     if let Some(length) = options.correlation_length.filter(|length| *length > 0.0) {
-        covariance = turning(&covariance, inliers, &rotation.rotation, flow, length);
+        covariance = correlated_rotation_covariance(&covariance, inliers, &rotation.rotation, flow, length);
     }
     let common = options.common.added_to_rotation(&rotation.rotation, &moved);
     if let Some(known) = &inliers.prior
@@ -146,7 +146,7 @@ pub(crate) fn rotation_report(
         out.alternatives.push(alone);
     }
     covariance += common;
-    turned(&mut out, &rotation.rotation, &covariance, rotation.chi2, &all.source);
+    report_rotation(&mut out, &rotation.rotation, &covariance, rotation.chi2, &all.source);
     let rest = |k: usize| {
         let row = all.row(k);
         (row.f - row.r * rotation.rotation).norm()
@@ -160,7 +160,7 @@ pub(crate) fn rotation_report(
 }
 
 /// A rotation alone: its covariance, and no depth for any of the usable points `source`.
-pub(crate) fn turned(
+pub(crate) fn report_rotation(
     out: &mut MotionEstimate,
     rotation: &Vector3<f64>,
     covariance: &Matrix3<f64>,
@@ -186,7 +186,7 @@ pub(crate) fn turned(
     }
 }
 
-/// Tells of all points that obey, beside those that the motion was estimated from; their depths are their
+/// Reports all inliers, beside those that the motion was estimated from; their depths are their
 /// own.
 pub(crate) fn with_all_inliers(mut found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
     for &k in &kept.inliers {
@@ -199,9 +199,10 @@ pub(crate) fn with_all_inliers(mut found: MotionEstimate, all: &Observations, ke
     found
 }
 
-/// Too few points to tell outliers from large noise, or from those that decide, make a motion doubtful that
+/// Too few points to separate outliers from large noise, or from those that decide, make a motion doubtful
+/// that
 /// nothing worse is said against. That there is none, or too little of one, is said of the same doubtful
-/// choice of points and no surer; what else is told says more.
+/// choice of points and no surer; other statuses say more.
 ///
 /// A rotation alone is not doubted if it leaves one noise of all points, which is the shorter description of
 /// them.
@@ -220,7 +221,7 @@ pub(crate) fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensu
 /// of that, which have Student's distribution with `f` degrees of freedom, the variance is `f / (f - 2)` (W.
 /// Gosset 1908).
 ///
-/// Residuals cut off as those of outliers tell less of the variance than all would.
+/// Truncated residuals determine the variance less well than all would.
 pub(crate) fn of_estimated_noise(points: usize, cut: bool) -> f64 {
     let free = points.saturating_sub(5) as f64 * if cut { TOLD_BY_CUT } else { 1.0 };
     let free = free.max(2.0 * 2.0);

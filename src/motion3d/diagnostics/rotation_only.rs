@@ -52,7 +52,7 @@ pub(crate) fn rotation_only(observations: &Observations) -> Option<RotationOnly>
         normal += known.information;
         right += known.pull(&Vector3::zeros()).0;
     }
-    // Points at one place tell of two of three unknowns; what rounding adds is no information.
+    // Points at one place determine two of three unknowns; what rounding adds is no information.
     if SymmetricEigen::new(normal).eigenvalues.min() <= DETERMINED * normal.trace() {
         return None;
     }
@@ -75,7 +75,7 @@ pub(crate) fn rotation_only(observations: &Observations) -> Option<RotationOnly>
 }
 
 /// The rotation alone, where chance explains what it leaves: of errors that points share there are fewer.
-pub(crate) fn turning(observations: &Observations) -> Option<RotationOnly> {
+pub(crate) fn explained_by_rotation(observations: &Observations) -> Option<RotationOnly> {
     let rotation = rotation_only(observations)?;
     by_chance(rotation.chi2, (2 * observations.n - 3) as f64 / observations.points_per_independent_sample)
         .then_some(rotation)
@@ -85,7 +85,7 @@ pub(crate) fn turning(observations: &Observations) -> Option<RotationOnly> {
 ///
 /// If there were no translation, that would take no more away than the same share of any noise, and what the
 /// choice of a direction takes.
-pub(crate) fn turning_in_unknown_noise(observations: &Observations, cost: f64) -> Option<RotationOnly> {
+pub(crate) fn explained_by_rotation_in_unknown_noise(observations: &Observations, cost: f64) -> Option<RotationOnly> {
     let rotation = rotation_only(observations)?;
     let n = observations.n as f64;
     // A wrong rotation that is said to be known is no noise of the flow.

@@ -7,24 +7,24 @@
 
 use crate::motion3d::kernels::{add_to_rotation, equations};
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::{Known, Observations};
+use crate::motion3d::model::observations::{KnownRotation, Observations};
 use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
 use crate::motion3d::model::statistics::by_chance;
 use crate::motion3d::solver::covariance::inverse;
-use crate::motion3d::solver::refine::{Effort, refine};
+use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use nalgebra::{Matrix3, Vector3};
 
 /// What a motion's covariance is made of: `own`, in which errors that the information takes for independent
 /// may go together, times `wider`, and what all flow has in `common`.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Grown {
+pub(crate) struct CovarianceParts {
     pub own: Matrix5,
     pub wider: f64,
     pub common: Matrix5,
 }
 
-impl Grown {
+impl CovarianceParts {
     /// Together.
     pub fn covariance(&self) -> Matrix5 {
         self.own * self.wider + self.common
@@ -35,7 +35,12 @@ impl Grown {
 /// it, or where the flow alone does not determine a motion.
 ///
 /// `information`: of the flow and of the known rotation together.
-pub(crate) fn contradiction(known: &Known, w: &Vector3<f64>, information: &Matrix5, told: &Grown) -> Option<Vector5> {
+pub(crate) fn contradiction(
+    known: &KnownRotation,
+    w: &Vector3<f64>,
+    information: &Matrix5,
+    told: &CovarianceParts,
+) -> Option<Vector5> {
     let mut of_flow = *information;
     add_to_rotation(&mut of_flow, &known.information, -1.0);
     let alone = inverse(&of_flow)?;
@@ -45,7 +50,7 @@ pub(crate) fn contradiction(known: &Known, w: &Vector3<f64>, information: &Matri
     // What errors do to the motion they do to that of the flow alone, which nothing holds back, the more.
     let freed = alone * information;
     let own = freed * told.own * freed.transpose() + alone - freed * alone;
-    // Of both only the flow's noise may be larger than it is told.
+    // Of both only the flow's noise may be larger than given.
     let spread = own * told.wider + freed * told.common * freed.transpose();
     let expected = before + spread.fixed_view::<3, 3>(2, 2);
     let expected = 0.5 * (expected + expected.transpose());
@@ -53,20 +58,20 @@ pub(crate) fn contradiction(known: &Known, w: &Vector3<f64>, information: &Matri
     (!by_chance(square, 3.0)).then(|| alone.fixed_columns::<3>(2) * force)
 }
 
-/// The motion that the flow tells by itself, the nearest one to `motion`, and how much less likely it is with
+/// The motion of the flow alone, the nearest one to `motion`, and how much less likely it is with
 /// the known rotation.
 pub(crate) fn of_flow_alone(inliers: &Observations, motion: &Motion) -> Alternative {
     let mut alone = inliers.clone();
     alone.prior = None;
-    let found = refine(&alone, *motion, None, Effort::of(inliers.n)).motion;
+    let found = refine(&alone, *motion, None, StoppingCriteria::of(inliers.n)).motion;
     let cost = |motion: &Motion| equations(inliers, motion, &tangents(&motion.u()), None).cost;
     Alternative { motion: found, excess: cost(&found) - cost(motion) }
 }
 
 /// The same of a rotation alone, by its covariance without and with what all flow has in common: what is to
-/// be added to that, and what the flow tells by itself.
+/// be added to that, and the motion of the flow alone.
 pub(crate) fn rotation_contradiction(
-    known: &Known,
+    known: &KnownRotation,
     w: &Vector3<f64>,
     plain: &Matrix3<f64>,
     own: &Matrix3<f64>,
@@ -79,7 +84,7 @@ pub(crate) fn rotation_contradiction(
         matrix
     };
     let information = whole(&plain.cholesky()?.inverse(), 1.0);
-    let told = Grown { own: whole(own, 1.0), wider: 1.0, common: whole(common, 0.0) };
+    let told = CovarianceParts { own: whole(own, 1.0), wider: 1.0, common: whole(common, 0.0) };
     let apart = contradiction(known, w, &information, &told)?.fixed_rows::<3>(2).into_owned();
     let (alone, (force, before)) = (w - apart, known.pull(w));
     let excess = known.pull(&alone).1 - before - force.dot(&apart);

@@ -1,7 +1,8 @@
-//! A motion found on the inliers, and what a linear theory of independent points leaves out of its covariance.
+//! A motion found on the inliers, and what a linear theory of independent points leaves out of its
+//! covariance.
 
-use super::correlated_noise::{Weighted, together};
-use super::rotation_prior::{Grown, contradiction};
+use super::correlated_noise::{Weighted, correlated_covariance};
+use super::rotation_prior::{CovarianceParts, contradiction};
 use crate::motion3d::kernels::{depths, equations, information, slopes};
 use crate::motion3d::model::camera::to_plane;
 use crate::motion3d::model::input::Flow;
@@ -11,8 +12,8 @@ use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::model::result::{Alternative, CommonEffect, Likelihood, Moved, Status, UNKNOWN, axes, nested};
 use crate::motion3d::model::rows::Matrix5;
 use crate::motion3d::robust::{Consensus, Told, among_strays};
-use crate::motion3d::solver::covariance::{Plugged, inverse};
-use crate::motion3d::solver::efficient::{Efficient, departure};
+use crate::motion3d::solver::covariance::{PluginCovariances, inverse};
+use crate::motion3d::solver::efficient::{Efficient, nonlinearity_covariance};
 use crate::motion3d::solver::likelihood::Candidate;
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, RowVector2};
 use std::borrow::Cow;
@@ -26,7 +27,7 @@ pub(crate) struct Solution {
     /// What is in it of errors that all flow has in common.
     pub common: CommonEffect,
     /// What it was made of.
-    grown: Option<Grown>,
+    grown: Option<CovarianceParts>,
     pub status: Status,
     pub alternatives: Vec<Alternative>,
     pub likelihood: Likelihood,
@@ -39,7 +40,12 @@ pub(crate) struct Solution {
 impl Solution {
     /// Maximum likelihood, and what became of the smoothed weights, which were `wanted` or only needed for
     /// maximum likelihood's covariance.
-    pub fn new(chosen: &Candidate, plugged: Option<&Plugged>, improved: Option<Efficient>, wanted: bool) -> Self {
+    pub fn new(
+        chosen: &Candidate,
+        plugged: Option<&PluginCovariances>,
+        improved: Option<Efficient>,
+        wanted: bool,
+    ) -> Self {
         let minimum = &chosen.minimum;
         let likelihood = Likelihood {
             motion: minimum.motion,
@@ -69,12 +75,12 @@ impl Solution {
                 variance: improved.variance,
                 ..plain
             },
-            Some(improved) => Self { covariance: Some(departure(minimum, &improved)), ..plain },
+            Some(improved) => Self { covariance: Some(nonlinearity_covariance(minimum, &improved)), ..plain },
             None => plain,
         }
     }
 
-    /// Takes into account that some of the points that obey are strays. Where depths are `given` for the
+    /// Takes into account that some of the inliers are so by chance. Where depths are `given` for the
     /// weights, which may be wrong, the motion stays.
     pub fn among_strays(&mut self, all: &Observations, known: &Consensus, given: bool) {
         let Some(covariance) = self.covariance else { return };
@@ -86,15 +92,15 @@ impl Solution {
     }
 
     /// Takes errors into the covariance that go together over a length, in the unit of the points.
-    pub fn go_together(&mut self, inliers: &Observations, flow: &Flow<'_>, length: Option<f64>) {
+    pub fn add_correlation(&mut self, inliers: &Observations, flow: &Flow<'_>, length: Option<f64>) {
         let (Some(covariance), Some(length)) = (self.covariance, length) else { return };
         let nu = self.weights(inliers);
         let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
-        self.covariance = together(&covariance, inliers, &at, flow, length);
+        self.covariance = correlated_covariance(&covariance, inliers, &at, flow, length);
     }
 
     /// What errors do that all flow has in common.
-    pub fn in_common(&self, inliers: &Observations, flow: &Flow<'_>, common: &CommonErrors) -> CommonEffect {
+    pub fn systematic_effect(&self, inliers: &Observations, flow: &Flow<'_>, common: &CommonErrors) -> CommonEffect {
         let Some(covariance) = self.covariance else { return CommonEffect::default() };
         let nu = self.weights(inliers);
         let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
@@ -103,14 +109,14 @@ impl Solution {
     }
 
     /// Has in its covariance, multiplied by `wider`, what errors do that all flow has in common.
-    pub fn widen(&mut self, wider: f64, common: CommonEffect) {
-        self.grown = self.covariance.map(|own| Grown { own, wider, common: common.added() });
-        self.covariance = self.grown.as_ref().map(Grown::covariance);
+    pub fn inflate(&mut self, wider: f64, common: CommonEffect) {
+        self.grown = self.covariance.map(|own| CovarianceParts { own, wider, common: common.added() });
+        self.covariance = self.grown.as_ref().map(CovarianceParts::covariance);
         self.common = common;
     }
 
     /// Whether the flow contradicts what is known beforehand of the rotation; the covariance then reaches as
-    /// far as the motion that the flow tells by itself.
+    /// far as the motion of the flow alone.
     pub fn contradicted(&mut self, inliers: &Observations) -> bool {
         let (Some(known), Some(grown)) = (inliers.prior.as_ref(), &self.grown) else { return false };
         let told = if let Some(nu) = &self.smooth {

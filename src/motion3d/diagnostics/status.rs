@@ -1,7 +1,7 @@
 //! How far a motion can be trusted.
 
 use super::confidence_region::{Farther, plausible_beyond, plausible_less_turned};
-use super::planar_twin::twin;
+use super::planar_twin::planar_twin;
 use super::solution::Solution;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{FrontEquations, equations, front_equations};
@@ -9,7 +9,7 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::result::{Alternative, Status};
 use crate::motion3d::model::rows::{Matrix5, tangents};
-use crate::motion3d::model::whitening::Intake;
+use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::robust::Rival;
 use crate::motion3d::solver::covariance::direction_deviation;
 use crate::motion3d::solver::likelihood::SAME;
@@ -23,7 +23,7 @@ const FEW: usize = 12;
 /// Standard deviation of the direction, degrees, beyond which it is not known.
 pub(crate) const WIDE: f64 = 20.0;
 
-/// Plausible directions reach as far as 3.3 deviations where the covariance is right; those looked at are
+/// Plausible directions reach 3.3 deviations where the covariance is right; those looked at are
 /// [`SPACING`] degrees apart, half of that from one of them.
 pub(crate) const FAR: f64 = 4.0;
 pub(crate) const SPACING: f64 = 4.0;
@@ -35,10 +35,10 @@ const CONSISTENT: f64 = 3.0;
 /// still, it is the valley that is looked for.
 const MOST: f64 = 1.5;
 
-/// Most points that are asked again where few leave a doubt.
+/// Most points that are tested again where few leave a doubt.
 const ASKED_AGAIN: usize = 16_000;
 
-/// The angle, degrees, beyond which few points are not asked.
+/// The angle, degrees, beyond which few points are not tested.
 const BLIND: f64 = 20.0;
 
 /// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
@@ -56,11 +56,11 @@ pub(crate) struct Evidence<'a> {
     pub deviation: f64,
     /// Whether the depths are mostly noise.
     pub low: bool,
-    /// Whether the covariance tells the shape of what is not known.
+    /// Whether the covariance describes the shape of the confidence region.
     pub told: bool,
     /// Whether the noise is what the motion leaves.
     pub unknown: bool,
-    /// Motions that other points obey.
+    /// Motions of other points.
     pub rivals: &'a [Rival],
     /// Another solution that is about as likely.
     pub undecided: Option<Alternative>,
@@ -68,7 +68,7 @@ pub(crate) struct Evidence<'a> {
 
 /// Finds what else could be true: the status, and the other motions among the alternatives.
 pub(crate) fn judge(
-    intake: &Intake<'_>,
+    whitening: &Whitening<'_>,
     inliers: &Observations,
     solution: &mut Solution,
     evidence: &Evidence<'_>,
@@ -77,7 +77,7 @@ pub(crate) fn judge(
     let deviation = solution.covariance.map_or(f64::INFINITY, |c| direction_deviation(&c));
     // Where even that is not finite, no other motion is distinct.
     let distinct = (3.0 * if deviation.is_finite() { deviation } else { 0.0 }).to_radians().max(1e-6);
-    let planar = planar(intake, inliers, solution, evidence, distinct);
+    let planar = planar(whitening, inliers, solution, evidence, distinct);
     let turned = opposite(inliers, &solution.motion, rng.stream(0));
     if let Some((motion, excess)) = turned {
         solution.alternatives.insert(0, Alternative { motion, excess });
@@ -98,7 +98,8 @@ pub(crate) fn judge(
     solution.status = if inliers.n < FEW {
         Status::FewPoints
     } else if inliers.unseen() > 0 {
-        // Turned by so much that points are behind the camera: such a motion was not told by all of them.
+        // Rotated by so much that points are behind the camera: such a motion is not supported by all
+        // of them.
         Status::IllConditioned
     } else if !determined(inliers, &solution.motion) {
         solution.covariance = None;
@@ -109,7 +110,7 @@ pub(crate) fn judge(
         || deviation.is_nan()
         || deviation > WIDE
         || far(inliers, &motions, deviation, evidence.deviation, rng.stream(1))
-        || otherwise_turned(intake, inliers, solution, (deviation, evidence.deviation), rng.stream(2))
+        || otherwise_turned(whitening, inliers, solution, (deviation, evidence.deviation), rng.stream(2))
     {
         Status::IllConditioned
     } else if turned.is_some() || evidence.undecided.is_some() {
@@ -133,13 +134,15 @@ fn once(alternatives: &mut Vec<Alternative>) {
 
 /// Whether the points are one plane that has another motion, too; that is then the first alternative.
 fn planar(
-    intake: &Intake<'_>,
+    whitening: &Whitening<'_>,
     inliers: &Observations,
     solution: &mut Solution,
     evidence: &Evidence<'_>,
     distinct: f64,
 ) -> bool {
-    let Some(twin) = twin(intake, inliers, &solution.motion, distinct, evidence.unknown) else { return false };
+    let Some(twin) = planar_twin(whitening, inliers, &solution.motion, distinct, evidence.unknown) else {
+        return false;
+    };
     let excess = twin.behind - evidence.likelihood.1;
     if excess >= EXCLUDED {
         return false;
@@ -152,11 +155,11 @@ fn planar(
 }
 
 /// Whether directions explain the flow as well as the estimate that are farther than the covariance has it:
-/// in a valley that bends or widens, that of its lowest point tells too little.
+/// in a valley that bends or widens, that of its lowest point is too small.
 ///
 /// `own` and `likelihood`: deviations of the estimate and of maximum likelihood, whose residuals are looked
 /// at; of the points that the search sees they are that much larger. Where few of many points leave a doubt,
-/// [`ASKED_AGAIN`] of them are asked: with noisy depths the deviation of the few grows faster than by the
+/// [`ASKED_AGAIN`] of them are tested: with noisy depths the deviation of the few grows faster than by the
 /// root of their number.
 fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rng: CounterRng) -> bool {
     let beyond = |most: usize| {
@@ -166,14 +169,14 @@ fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rn
     if inliers.n <= SEARCHED {
         return beyond(SEARCHED);
     }
-    // Where the deviation of few is too large for anything to lie beyond it, these tell nothing.
+    // Where the deviation of few is too large for anything to lie beyond it, these decide nothing.
     let blind = CONSISTENT * own * (inliers.n as f64 / SEARCHED as f64).sqrt() > BLIND;
     (blind || beyond(SEARCHED)) && beyond(ASKED_AGAIN)
 }
 
-/// The same for motions that turn quite otherwise.
+/// The same for motions with a quite different rotation.
 fn otherwise_turned(
-    intake: &Intake<'_>,
+    whitening: &Whitening<'_>,
     inliers: &Observations,
     solution: &Solution,
     (own, likelihood): (f64, f64),
@@ -181,7 +184,7 @@ fn otherwise_turned(
 ) -> bool {
     let fewer = (inliers.n as f64 / inliers.n.min(ASKED_AGAIN) as f64).sqrt();
     let farther = farther(own, likelihood, fewer);
-    plausible_less_turned(intake, inliers, &solution.motion, farther, ASKED_AGAIN, rng)
+    plausible_less_turned(whitening, inliers, &solution.motion, farther, ASKED_AGAIN, rng)
 }
 
 /// What is farther than a covariance has it, of points whose deviations are `fewer` times larger.
@@ -192,8 +195,8 @@ fn farther(own: f64, likelihood: f64, fewer: f64) -> Farther {
     }
 }
 
-/// Whether the points tell of all five unknowns: points at one or a few places, or on a line through the
-/// epipole, do not, whatever their noise seems to add.
+/// Whether the points determine all five unknowns: points at one or a few places, or on a line through the
+/// epipole, do not, although their noise seems to.
 pub(crate) fn determined(observations: &Observations, motion: &Motion) -> bool {
     let tangent = tangents(&motion.u());
     let h = equations(observations, motion, &tangent, None).h;
@@ -231,7 +234,7 @@ pub(crate) fn in_front(observations: &Observations, start: &Motion) -> (Motion, 
     let mut here: FrontEquations = equations(&motion);
     for _ in 0..STEPS {
         let mut h = here.h;
-        // The last term keeps directions that no point tells of where they are.
+        // The last term keeps undetermined directions where they are.
         let floor = 1e-12 * h.trace();
         for i in 0..5 {
             h[(i, i)] += damping * h[(i, i)] + floor;

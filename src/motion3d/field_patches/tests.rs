@@ -15,7 +15,7 @@ fn camera() -> Intrinsics {
     Intrinsics::pinhole((FOCAL, FOCAL), (160.0, 120.0)).unwrap()
 }
 
-/// A field of 320 x 240 px whose six numbers at each pixel are told, with the deviations `NOISE`.
+/// A field of 320 x 240 px whose six numbers at each pixel are given, with the deviations `NOISE`.
 fn field(stride: usize, length: f64, six: impl Fn(f64, f64) -> [f64; 6]) -> FlowField<f64> {
     let layout = FieldLayout {
         frame_size: (320, 240),
@@ -59,8 +59,8 @@ fn an_affine_flow_is_told_at_the_middles() {
             assert!((got - want).abs() < 1e-10, "{got} {want}");
         }
     }
-    // A slope has its own information and that of the flow around the middle; the flow is told apart from a
-    // bend, which the slopes tell, too. With the means of dx^2 and of dx^4.
+    // A slope has its own information and that of the flow around the middle; the flow is separated from a
+    // bend, which the slopes determine, too. With the means of dx^2 and of dx^4.
     let (flow, slope) = (NOISE[0] * NOISE[0], NOISE[2] * NOISE[2]);
     let (second, fourth) = ((3600.0 - 1.0) / 12.0, (3.0 * 3600.0 * 3600.0 - 10.0 * 3600.0 + 7.0) / 240.0);
     let bend = 0.25 * (fourth + second * second) / flow + second / slope;

@@ -26,9 +26,9 @@ pub(crate) struct Equations {
 }
 
 impl Equations {
-    /// What depths behind the camera speak against a motion: the noise of depths that are hardly any leaves
+    /// What depths behind the camera speak against a motion: the noise of depths near 0 leaves
     /// `sum (nu^ / sd)^2` of no more than their number.
-    pub fn signs(&self) -> f64 {
+    pub fn cheirality_cost(&self) -> f64 {
         (self.behind - self.reversed).max(0.0)
     }
 }

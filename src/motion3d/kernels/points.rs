@@ -1,4 +1,4 @@
-//! What single passes over the points tell: the best rotation for a direction, depths, how many obey.
+//! Single passes over the points: the best rotation for a direction, depths, the truncated cost.
 
 use super::{Everywhere, Planes, over_chunks, see, total};
 use crate::motion3d::model::motion::Motion;
@@ -139,11 +139,10 @@ impl Kernel<f64> for ConsensusSum<'_> {
     }
 }
 
-/// `sum min(e^2 + [nu^ < 0] min((nu^ / sd)^2, cut^2 / 2), cut^2)`: a point that does not obey counts once,
-/// for whatever reason.
+/// `sum min(e^2 + [nu^ < 0] min((nu^ / sd)^2, cut^2 / 2), cut^2)`: an outlier counts once.
 ///
 /// One on its epipolar line with a depth behind the camera counts half: what moves along with the camera, or
-/// overtakes it, obeys the same lines, as no stray does.
+/// overtakes it, lies on the same lines, unlike an outlier.
 pub(crate) fn consensus(observations: &Observations, motion: &Motion, cut: f64) -> f64 {
     let [cost] = over_chunks(observations, |range| {
         let planes = observations.slices(&range);

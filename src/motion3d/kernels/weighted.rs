@@ -2,7 +2,7 @@
 
 use super::{Everywhere, Planes, Seen, UPPER, add_to_rotation, at, both_axes, dot, over_chunks, see, total, turn};
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::{Known, Observations};
+use crate::motion3d::model::observations::{KnownRotation, Observations};
 use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::simd::{Kernel, Lanes, dispatch};
 use nalgebra::Matrix2x3;
@@ -125,7 +125,7 @@ impl Kernel<f64> for SlopeSums<'_> {
             let (seen, [pulled, pushed, ..]) = WeightSums::row(&planes, nu, i, &motion, &axes, floor);
             let a = turn(&seen.t, dot(&planes, 0, i, &axes[0]), dot(&planes, 3, i, &axes[0]));
             let b = turn(&seen.t, dot(&planes, 0, i, &axes[1]), dot(&planes, 3, i, &axes[1]));
-            // The noise of the own depth is in both factors, as far as it is in the weight.
+            // The noise of the own depth is in both factors, by its share in the weight.
             let own = seen.along * seen.inverse;
             let both = V::load(&nu[i..]).mul_add(own, (V::zero() - V::load(&self.share[i..])) * seen.inverse);
             let weight = damped(&planes, i, seen.s2, floor, half_spread);
@@ -230,7 +230,7 @@ impl Kernel<f64> for BilinearSums<'_> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bilinear {
     sums: [f64; BILINEAR_SUMS],
-    prior: Option<Known>,
+    prior: Option<KnownRotation>,
 }
 
 impl Bilinear {

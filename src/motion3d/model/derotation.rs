@@ -1,11 +1,13 @@
 //! Displacements over a whole frame with its rotation taken out, so that what is left is exact.
 //!
-//! A steady motion `X_dot = u + w x X` takes `X_1` to `X_2 = exp([w]x) X_1 + V u` in one frame. Turned to the
+//! A steady motion `X_dot = u + w x X` takes `X_1` to `X_2 = exp([w]x) X_1 + V u` in one frame. Rotated to
+//! the
 //! camera's orientation half way, `X_1' = exp([w]x / 2) X_1` and `X_2' = exp(-[w]x / 2) X_2`, only a
 //! translation is left:
 //!
 //! ```text
-//! X_2' = X_1' + t,    t = V' u,    V' = int exp(s [w]x) ds from -1/2 to 1/2 = I + (1 - sin(a / 2) / (a / 2)) / a^2 [w]x^2,   a = |w|
+//! X_2' = X_1' + t,    t = V' u,    V' = int exp(s [w]x) ds from -1/2 to 1/2
+//! V' = I + (1 - sin(a / 2) / (a / 2)) / a^2 [w]x^2,    a = |w|
 //! ```
 //!
 //! `V'` is symmetric and has no part of first order in `w`. The picture's points of both ends, `eta_1'` and
@@ -36,7 +38,7 @@ const CHANGE: f64 = 0.5;
 
 /// A rotation that is taken out of displacements, half of it from each end.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct HalfTurn {
+pub(crate) struct Derotation {
     /// `w`, rad/frame.
     pub rotation: Vector3<f64>,
     /// `exp([w]x / 2)`.
@@ -51,7 +53,7 @@ pub(crate) struct HalfTurn {
 
 /// A displacement with the rotation taken out.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Turned {
+pub(crate) struct DerotatedFlow {
     /// `m`, half way between both ends.
     pub middle: [f64; 2],
     /// The rows of `u` at the first of both ends, free of the flow's noise, and of `w` half way.
@@ -79,7 +81,7 @@ fn pictured(a: &Matrix3<f64>, [x, y]: [f64; 2]) -> Option<(Vector2<f64>, Matrix2
     Some((at, Matrix2::from_fn(slope)))
 }
 
-impl HalfTurn {
+impl Derotation {
     /// Takes out the rotation `w`, rad/frame.
     pub fn new(rotation: &Vector3<f64>) -> Self {
         let a = rotation.norm();
@@ -113,7 +115,7 @@ impl HalfTurn {
     /// Of the displacement only what lies along the epipolar line of the direction that is known counts: what
     /// is across is the noise of the residual, and rows that go with it would not leave the sum of their
     /// products zero. Depths that noise has change the rows rather by less than by far too much.
-    fn turning(&self, from: &Vector2<f64>, g: &Matrix2x3<f64>, left: &Vector2<f64>) -> Matrix2x3<f64> {
+    fn rotation_rows(&self, from: &Vector2<f64>, g: &Matrix2x3<f64>, left: &Vector2<f64>) -> Matrix2x3<f64> {
         let t = g * self.towards;
         let square = t.norm_squared();
         let known = square > 0.0;
@@ -125,15 +127,15 @@ impl HalfTurn {
 
     /// The displacement from `first` to `second`, places on the plane at distance 1, without the rotation;
     /// `None` where that leads behind the camera.
-    pub fn out_of(&self, first: [f64; 2], second: [f64; 2]) -> Option<Turned> {
+    pub fn out_of(&self, first: [f64; 2], second: [f64; 2]) -> Option<DerotatedFlow> {
         let (from, at_first) = pictured(&self.half, first)?;
         let (to, spread) = pictured(&self.half.transpose(), second)?;
         let middle: [f64; 2] = (0.5 * (from + to)).into();
         let (left, g) = (to - from, Rows::plane(from.into()).g);
-        let turning = self.turning(&from, &g, &left);
+        let turning = self.rotation_rows(&from, &g, &left);
         let rows = Rows { g: g * self.mean, r: turning * self.mean };
         let flow = left + turning * self.rotation;
-        Some(Turned { middle, rows, left, flow, spread, first: at_first })
+        Some(DerotatedFlow { middle, rows, left, flow, spread, first: at_first })
     }
 
     /// The displacement over the whole frame of a point of the first view, on the plane at distance 1, whose
@@ -154,26 +156,26 @@ impl HalfTurn {
     }
 
     /// Inverse depths half way in time from those in the rows, for the translation `u`.
-    pub fn half_way(&self, u: &Vector3<f64>) -> HalfWay {
-        HalfWay { ahead: self.lag * self.rotation.cross(u).z + self.middle(u).ahead }
+    pub fn half_way(&self, u: &Vector3<f64>) -> MidpointDepth {
+        MidpointDepth { ahead: self.lag * self.rotation.cross(u).z + self.middle(u).ahead }
     }
 
     /// Those half way between both ends.
-    pub fn middle(&self, u: &Vector3<f64>) -> HalfWay {
-        HalfWay { ahead: -0.5 * (self.mean * u).z }
+    pub fn middle(&self, u: &Vector3<f64>) -> MidpointDepth {
+        MidpointDepth { ahead: -0.5 * (self.mean * u).z }
     }
 }
 
 /// From inverse depths in rows that a rotation was taken out of to those half way in time.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct HalfWay {
+pub(crate) struct MidpointDepth {
     /// How much farther along the optical axis a point is there than at the second end, in units of `|u|`:
     /// `(X_1' + X_2') / 2 = X_2' - t / 2` half way between both ends, and half way in time `(X_1' + X_2') / 2
     /// + (1 - cos(a / 2)) / a^2 (w x u)`.
     ahead: f64,
 }
 
-impl HalfWay {
+impl MidpointDepth {
     /// `1 / (1 / nu + ahead)`.
     pub fn depth(self, nu: f64) -> f64 {
         nu / (1.0 + nu * self.ahead)
@@ -205,7 +207,7 @@ mod tests {
     fn rows_are_exact_for_the_rotation_that_was_taken_out() {
         for rotation in [[0.0; 3], [1e-4, -2e-4, 1e-4], [0.1, -0.2, 0.15], [0.4, 0.3, -0.2]] {
             let motion = Motion::new([0.6, 0.2, 0.75], rotation);
-            let turn = HalfTurn::new(&motion.w());
+            let turn = Derotation::new(&motion.w());
             for (first, nu) in [([0.4, -0.3], 0.2), ([-0.5, 0.1], 0.05), ([0.0, 0.0], 1e-3)] {
                 let (first, second, depth) = seen(&motion, first, nu);
                 let turned = turn.out_of(first, second).unwrap();
@@ -226,11 +228,11 @@ mod tests {
         let rotation = Vector3::new(0.1, -0.2, 0.15);
         let motion = Motion::new([0.6, 0.2, 0.75], rotation.into());
         let (first, second, _) = seen(&motion, [0.4, -0.3], 0.02);
-        let here = HalfTurn::new(&rotation).out_of(first, second).unwrap();
+        let here = Derotation::new(&rotation).out_of(first, second).unwrap();
         for axis in 0..3 {
             let by = Vector3::ith(axis, 1e-6);
             let left = |w: Vector3<f64>| {
-                let turned = HalfTurn::new(&w).out_of(first, second).unwrap();
+                let turned = Derotation::new(&w).out_of(first, second).unwrap();
                 turned.flow - Rows::plane(turned.middle).r * w
             };
             let slope = (left(rotation + by) - left(rotation - by)) / 2e-6;
@@ -243,14 +245,14 @@ mod tests {
     #[test]
     fn series_join_the_closed_forms() {
         let axis = Vector3::new(0.6, -0.48, 0.64);
-        let (below, above) = (HalfTurn::new(&(axis * 0.999e-3)), HalfTurn::new(&(axis * 1.001e-3)));
+        let (below, above) = (Derotation::new(&(axis * 0.999e-3)), Derotation::new(&(axis * 1.001e-3)));
         assert!((below.lag - above.lag).abs() < 1e-9 && (below.mean - above.mean).norm() < 1e-9);
         assert!((above.lag - 0.125).abs() < 1e-8);
     }
 
     #[test]
     fn noise_of_the_second_view_spreads_as_told() {
-        let turn = HalfTurn::new(&Vector3::new(0.2, -0.1, 0.3));
+        let turn = Derotation::new(&Vector3::new(0.2, -0.1, 0.3));
         let (first, second, h) = ([0.3, -0.2], [0.35, -0.1], 1e-6);
         let here = turn.out_of(first, second).unwrap();
         let ends = |second: [f64; 2]| pictured(&turn.half.transpose(), second).unwrap().0;

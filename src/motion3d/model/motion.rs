@@ -1,7 +1,7 @@
 //! A rigid motion: the flow it makes, its finite displacement, its essential matrix.
 
 use super::camera::Intrinsics;
-use super::derotation::HalfTurn;
+use super::derotation::Derotation;
 use super::rows::{AffineRows, Rows, Vector5, cross_matrix};
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 
@@ -42,8 +42,8 @@ impl Motion {
     }
 
     /// What takes this motion's rotation out of displacements.
-    pub(crate) fn derotation(&self) -> HalfTurn {
-        HalfTurn::along(&self.w(), &self.u())
+    pub(crate) fn derotation(&self) -> Derotation {
+        Derotation::along(&self.w(), &self.u())
     }
 
     /// The same flow with all depths of the other sign.
@@ -86,7 +86,7 @@ impl Motion {
     /// distance 1, as the steady motion has it: exact, with the inverse depth half way in time. NaN where the
     /// point is behind the camera.
     pub fn picture_displacement(&self, point: [f64; 2], inverse_depth: f64, camera: Option<&Intrinsics>) -> [f64; 2] {
-        let turn = HalfTurn::new(&self.w());
+        let turn = Derotation::new(&self.w());
         let Some(camera) = camera else { return turn.displacement(&self.u(), point, inverse_depth).into() };
         (camera.unscale() * turn.displacement(&self.u(), camera.to_plane(point), inverse_depth)).into()
     }

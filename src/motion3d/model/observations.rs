@@ -1,6 +1,6 @@
 //! What was measured, whitened once: two rows of `G`, `R` and `f` for every usable point, as planes.
 
-use super::derotation::HalfTurn;
+use super::derotation::Derotation;
 use super::rows::Rows;
 use crate::math::{median, quantile};
 use crate::simd::Level;
@@ -20,7 +20,7 @@ const EPIPOLE: f64 = 1e-9;
 /// Residuals below this share of the flow are rounding.
 pub(crate) const ROUNDING: f64 = 1e-11;
 
-/// Points that are asked how far their noise is from round, and the share of them of which that is told.
+/// Points whose noise ellipses are measured, and the quantile of their ratios that is used.
 const ENOUGH: usize = 1000;
 const FAR_FROM_ROUND: f64 = 0.9;
 
@@ -61,7 +61,7 @@ pub(crate) struct Observations {
     /// The instruction set of the kernels.
     pub level: Level,
     /// What is known of the rotation beforehand.
-    pub prior: Option<Known>,
+    pub prior: Option<KnownRotation>,
     /// How many points share one error: their own has the variance `1 / shared`.
     pub points_per_independent_sample: f64,
     /// Whether errors of neighbours are independent.
@@ -69,7 +69,7 @@ pub(crate) struct Observations {
     /// Whether flow is a displacement over a whole frame.
     pub displaced: bool,
     /// The rotation that was taken out of displacements.
-    pub turn: Option<HalfTurn>,
+    pub turn: Option<Derotation>,
     /// What everything was multiplied with since it was whitened.
     units: f64,
 }
@@ -98,8 +98,8 @@ impl Observations {
         self.prior.map_or(0.0, |known| known.pull(w).1)
     }
 
-    /// Usable points in the order given; `source` tells where they come from. Their sites are left to be
-    /// told.
+    /// Usable points in the order given; `source` says where they come from. Their sites are left
+    /// empty.
     pub fn new(rows: &[Row], position: Vec<[f64; 3]>, spherical: bool, source: Vec<u32>) -> Self {
         let n = rows.len();
         let stride = n.next_multiple_of(ALIGN);
@@ -281,12 +281,12 @@ fn unit(covariance: &Matrix2<f64>) -> Option<Matrix2<f64>> {
 
 /// A rotation known beforehand, with the inverse of its covariance.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Known {
+pub(crate) struct KnownRotation {
     pub rotation: Vector3<f64>,
     pub information: Matrix3<f64>,
 }
 
-impl Known {
+impl KnownRotation {
     /// `(w0 - w)` times the information, and the square of the difference in its units.
     pub fn pull(&self, w: &Vector3<f64>) -> (Vector3<f64>, f64) {
         let off = self.rotation - w;

@@ -2,7 +2,7 @@
 
 use super::input::{Flow, Noise, Placement};
 use super::motion::{Motion, Projection};
-use super::observations::Known;
+use super::observations::KnownRotation;
 use super::result::{CommonEffect, MotionEstimate, Moved};
 use super::rows::{Matrix5, Vector5};
 use crate::error::{Error, Result, numbers};
@@ -22,11 +22,12 @@ pub enum Method {
 }
 
 /// A rotation rate known from elsewhere: a gyroscope, or the rest of the scene where the points lie on a
-/// thing that moves by itself.
+/// object that moves by itself.
 ///
 /// In a narrow field a rotation looks like a sideways translation; what is known of it decides between both.
-/// Where flow contradicts it beyond chance the status is [`Ambiguous`](crate::motion3d::Status::Ambiguous); of a
-/// rotation alone the covariance and the alternative tell.
+/// Where flow contradicts it beyond chance the status is [`Ambiguous`](crate::motion3d::Status::Ambiguous);
+/// of a
+/// rotation alone the covariance and the alternative show it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotationPrior {
     /// Rotation rate `w`, rad/frame.
@@ -37,20 +38,24 @@ pub struct RotationPrior {
 
 impl RotationPrior {
     /// `None` unless everything is finite and the covariance positive definite.
-    pub(crate) fn information(&self) -> Option<Known> {
+    pub(crate) fn information(&self) -> Option<KnownRotation> {
         let covariance = Matrix3::from_fn(|i, j| 0.5 * (self.covariance[i][j] + self.covariance[j][i]));
-        let known = Known { rotation: self.rotation.into(), information: covariance.cholesky()?.inverse() };
+        let known = KnownRotation { rotation: self.rotation.into(), information: covariance.cholesky()?.inverse() };
         known.rotation.iter().chain(known.information.iter()).all(|value| value.is_finite()).then_some(known)
     }
 
-    /// What a scene's rotation says of that of a thing in it, which may turn by itself by `object_rotation_std` (standard
+    /// The prior for an object in a scene, which may rotate by itself by `object_rotation_std` (standard
     /// deviation about each axis, rad/frame). `None` where the scene's is not known.
     pub fn of_scene(scene: &MotionEstimate, object_rotation_std: f64) -> Option<Self> {
         Self::from_scene_covariance(scene.motion.rotation, &scene.covariance, object_rotation_std)
     }
 
     /// The same from the scene's rotation and the covariance of its `(psi, w)`.
-    pub fn from_scene_covariance(rotation: [f64; 3], covariance: &[[f64; 5]; 5], object_rotation_std: f64) -> Option<Self> {
+    pub fn from_scene_covariance(
+        rotation: [f64; 3],
+        covariance: &[[f64; 5]; 5],
+        object_rotation_std: f64,
+    ) -> Option<Self> {
         let own = |i, j| if i == j { object_rotation_std * object_rotation_std } else { 0.0 };
         let covariance = std::array::from_fn(|i| std::array::from_fn(|j| covariance[2 + i][2 + j] + own(i, j)));
         let known = Self { rotation, covariance };
@@ -63,7 +68,7 @@ impl RotationPrior {
 pub struct MotionOptions {
     /// Which estimator; default: by the number of points.
     pub method: Method,
-    /// Whether points that do not obey the motion are found and left out; default: no.
+    /// Whether outliers of the motion are found and left out; default: no.
     pub robust: bool,
     /// Where displacements belong on the plane; default: half way. Bearings and their flow are taken as
     /// given.
@@ -78,7 +83,7 @@ pub struct MotionOptions {
     /// What is known of the rotation beforehand; default: nothing.
     pub rotation_prior: Option<RotationPrior>,
     /// How many points share one error, at least 1: the noise given is so many times their own in variance,
-    /// so that together they tell no more than they know. What is an outlier, and what chance explains, is
+    /// so that together they count once. What is an outlier, and what chance explains, is
     /// judged by their own. Default: 1.
     pub points_per_independent_sample: Option<f64>,
     /// How far errors of neighbours go together, in the unit of the points (px with a camera, rad on the
@@ -175,7 +180,7 @@ pub enum Smoother {
 /// Standard deviations of errors that all flow of a picture has in common. Default: 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CommonErrors {
-    /// Of a factor, about 1, that all flow is too long by: no residual tells it, and it is one of the
+    /// Of a factor, about 1, that all flow is too long by: no residual shows it, and it is one of the
     /// rotation's length.
     pub scale: f64,
     /// Of each component of one displacement, in the unit of the flow: most of it looks like a rotation. Not
@@ -208,7 +213,7 @@ impl CommonErrors {
         &self,
         covariance: &Matrix5,
         motion: &Motion,
-        known: Option<&Known>,
+        known: Option<&KnownRotation>,
         (moved, unit): (&Moved, &Matrix2<f64>),
     ) -> CommonEffect {
         let w = motion.w();

@@ -1,28 +1,28 @@
-//! What an estimate tells.
+//! The result of an estimate.
 
 use super::camera::Intrinsics;
 use super::motion::Motion;
 use super::rows::{Matrix5, Vector5};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, RowVector2, SMatrix, SVector, Vector2};
 
-/// How far an estimate can be trusted.
+/// Whether an estimate is usable, or why not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Status {
     /// A motion with its covariance.
     Ok,
     /// Fewer than 12 points (or patches at fewer than 5 places): several motions may explain them exactly.
-    /// Also too few to tell outliers from inliers: from large noise that is not known, or where a tenth of
-    /// what obeys does so by chance.
+    /// Also too few to separate outliers from inliers: in large unknown noise, or where a tenth of
+    /// the inliers are so by chance.
     FewPoints,
     /// Fewer than 5 points (or 2 patches): no motion.
     TooFewPoints,
-    /// The flow is that of a rotation, as far as its noise lets tell: `u` is NaN, inverse depths are 0.
+    /// The flow is that of a rotation within its noise: `u` is NaN, inverse depths are 0.
     RotationOnly,
     /// Another motion explains the flow as well, and is among the alternatives: that of a plane, the opposite
     /// direction where depths do not exclude it, another minimum, that of other points in a robust search,
     /// that of the flow by itself where it contradicts what is known of the rotation.
     Ambiguous,
-    /// The points do not tell of all unknowns (then there is no covariance, or no motion), the direction's
+    /// The points do not determine all unknowns (then there is no covariance, or no motion), the direction's
     /// standard deviation exceeds 20 degrees or 1.5 times the field, its confidence interval has no end, or
     /// directions farther than the covariance has it explain the flow as well.
     IllConditioned,
@@ -78,7 +78,7 @@ pub struct MotionEstimate {
     pub status: Status,
     /// Whether the smoothed weights were used: if not, the motion is that of maximum likelihood.
     pub efficient: bool,
-    /// Whether the smoothed weights were asked for but led nowhere.
+    /// Whether the smoothed weights were requested but had no solution.
     pub fell_back: bool,
     /// Covariance of `(psi, w)`: `u + psi_1 tangent_1 + psi_2 tangent_2`, rad and rad/frame.
     pub covariance: [[f64; 5]; 5],
@@ -98,7 +98,7 @@ pub struct MotionEstimate {
     pub inverse_depth_std: Vec<f64>,
     /// `nu~` (N), the depths in the weights; those of maximum likelihood are `nu^`. NaN for points left out.
     pub inverse_depth_smooth: Vec<f64>,
-    /// `(nu, nu_x, nu_y)` in the weights (N), of six numbers a patch; empty otherwise. Slopes are per unit of
+    /// `(nu, nu_x, nu_y)` in the weights (N), of six numbers a patch; else empty. Slopes are per unit of
     /// the plane at distance 1.
     pub surfaces: Vec<[f64; 3]>,
     /// Frames to contact (N), `-1 / (nu~ u_z)`: positive when approaching, infinite where there is no
@@ -109,7 +109,7 @@ pub struct MotionEstimate {
     /// `nu u_z` of the points together and its standard deviation, 1/frame, weighted by what each point's own
     /// flow says: that of one object, or of the scene's mean. Its time to contact is `-1 / rate`.
     pub approach: (f64, f64),
-    /// Points that obey the motion (N).
+    /// Inliers of the motion (N).
     pub inliers: Vec<bool>,
     /// Standard deviation of the flow, given or estimated, in its unit; 1 where covariances were given.
     pub sigma: f64,
@@ -198,7 +198,7 @@ pub(crate) type Moved = SMatrix<f64, 5, 2>;
 
 /// What they do to a motion: its covariance has the squares of `motion` in it. Default: nothing.
 ///
-/// Whatever is computed from the same flow and the motion together, as depths are, errs with both.
+/// What is computed from the same flow and the motion, as depths are, errs with both.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CommonEffect {
     /// Standard deviation of the factor.
@@ -240,7 +240,7 @@ impl CommonEffect {
     }
 }
 
-/// A motion as far as times to contact take it: that of a [`MotionEstimate`](crate::motion3d::MotionEstimate) by
+/// What times to contact need of a motion: that of a [`MotionEstimate`](crate::motion3d::MotionEstimate) by
 /// [`uncertain`](crate::motion3d::MotionEstimate::uncertain).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UncertainMotion {

@@ -1,7 +1,7 @@
-//! From what is given to whitened points.
+//! Whitens given points: rows with unit noise covariance.
 
 use super::camera::Intrinsics;
-use super::derotation::HalfTurn;
+use super::derotation::Derotation;
 use super::input::{Flow, Noise, Placement};
 use super::observations::{Observations, Row};
 use super::rows::{Rows, tangents};
@@ -14,27 +14,27 @@ const TOGETHER: usize = 1024;
 
 /// What was given, to be whitened as often as another rotation is taken out of its displacements.
 #[derive(Clone, Copy)]
-pub(crate) struct Intake<'a> {
+pub(crate) struct Whitening<'a> {
     pub flow: &'a Flow<'a>,
     pub noise: &'a Noise<'a>,
     pub placement: Placement,
     /// Which covariances are.
-    belief: Belief,
+    floor: CovarianceFloor,
 }
 
-impl<'a> Intake<'a> {
+impl<'a> Whitening<'a> {
     pub fn new(flow: &'a Flow<'a>, noise: &'a Noise<'a>, placement: Placement) -> Self {
-        let mut intake = Self { flow, noise, placement, belief: Belief::default() };
+        let mut whitening = Self { flow, noise, placement, floor: CovarianceFloor::default() };
         if matches!(noise, Noise::Covariances(_)) {
-            intake.belief = Belief::new((0..flow.len()).map(|k| intake.told(k)));
+            whitening.floor = CovarianceFloor::new((0..flow.len()).map(|k| whitening.given_covariance(k)));
         }
-        intake
+        whitening
     }
 }
 
-impl Intake<'_> {
+impl Whitening<'_> {
     /// The covariance of a point's flow as it was given, in screen axes, in squared units of the flow.
-    fn told(&self, k: usize) -> Matrix2<f64> {
+    fn given_covariance(&self, k: usize) -> Matrix2<f64> {
         match (self.flow, self.noise) {
             (Flow::Plane { .. }, Noise::Covariances(c)) => symmetric(Matrix2::from_row_slice(&c[4 * k..4 * k + 4])),
             (Flow::Sphere { bearings, .. }, Noise::Covariances(c)) => {
@@ -57,13 +57,13 @@ impl Intake<'_> {
         let position = kept().map(|((_, at), _)| *at).collect();
         let source = kept().map(|(_, source)| *source).collect();
         let mut out = Observations::new(&whitened, position, matches!(self.flow, Flow::Sphere { .. }), source);
-        out.displaced = self.displaced();
-        out.site = self.sites(&out);
+        out.displaced = self.has_displacements();
+        out.site = self.given_positions(&out);
         out
     }
 
     /// Where points were given: bearings, or places on the plane at distance 1.
-    fn sites(&self, points: &Observations) -> Vec<[f64; 3]> {
+    fn given_positions(&self, points: &Observations) -> Vec<[f64; 3]> {
         let Flow::Plane { points: given, camera, .. } = self.flow else { return points.position.clone() };
         let place = |&k: &u32| {
             let at = given[k as usize];
@@ -74,13 +74,13 @@ impl Intake<'_> {
     }
 
     /// Whether flow is a displacement from a place that is given.
-    pub fn displaced(&self) -> bool {
+    pub fn has_displacements(&self) -> bool {
         self.placement == Placement::Midpoint && matches!(self.flow, Flow::Plane { .. })
     }
 
     /// The same points in the same units, with the rotation of a motion taken out of their displacements; a
     /// point that this leads behind the camera gets weight 0.
-    pub fn turned(&self, points: &Observations, turn: HalfTurn) -> Observations {
+    pub fn derotated(&self, points: &Observations, turn: Derotation) -> Observations {
         let nothing = Row { g: nalgebra::Matrix2x3::zeros(), r: nalgebra::Matrix2x3::zeros(), f: Vector2::zeros() };
         let one = |(&k, &before): (&u32, &[f64; 3])| match self.row(k as usize, Some(&turn)) {
             (Some(row), at) => (row, at),
@@ -101,8 +101,8 @@ impl Intake<'_> {
         sources.par_iter().with_min_len(TOGETHER).map(|&k| self.row(k as usize, None)).collect()
     }
 
-    fn row(&self, k: usize, turn: Option<&HalfTurn>) -> (Option<Row>, [f64; 3]) {
-        let covariance = self.belief.of(self.told(k));
+    fn row(&self, k: usize, turn: Option<&Derotation>) -> (Option<Row>, [f64; 3]) {
+        let covariance = self.floor.of(self.given_covariance(k));
         match self.flow {
             Flow::Plane { points, flow, camera } => {
                 let row = match turn {
@@ -128,7 +128,7 @@ pub(crate) fn turned_row(
     flow: [f64; 2],
     covariance: &Matrix2<f64>,
     camera: Option<&Intrinsics>,
-    turn: &HalfTurn,
+    turn: &Derotation,
 ) -> Option<(Row, [f64; 2])> {
     let to_plane = |at: [f64; 2]| camera.map_or(at, |camera| camera.to_plane(at));
     let turned = turn.out_of(to_plane(point), to_plane([point[0] + flow[0], point[1] + flow[1]]))?;
@@ -166,11 +166,11 @@ pub(crate) const PRECISE: f64 = 0.25;
 
 /// Usual variances, and which ones are too small beside them.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Belief {
+pub(crate) struct CovarianceFloor {
     usual: f64,
 }
 
-impl Belief {
+impl CovarianceFloor {
     /// From the covariances of all points; those that are not finite do not count.
     pub fn new(covariances: impl Iterator<Item = Matrix2<f64>>) -> Self {
         let mut least: Vec<f64> = covariances.map(|given| smallest(&given)).filter(|v| v.is_finite()).collect();
@@ -192,7 +192,7 @@ pub(crate) fn smallest(given: &Matrix2<f64>) -> f64 {
 
 /// The same for several numbers a point, each with a unit of its own: `size * size` values a matrix, row by
 /// row.
-pub(crate) fn believed(covariances: &[f64], size: usize) -> Vec<f64> {
+pub(crate) fn floored_covariances(covariances: &[f64], size: usize) -> Vec<f64> {
     let diagonal = |i: usize| {
         let mut own: Vec<f64> = covariances.iter().skip(i * (size + 1)).step_by(size * size).copied().collect();
         own.retain(|value| value.is_finite());
@@ -217,14 +217,14 @@ mod tests {
     fn a_variance_of_nothing_is_not_believed_and_a_quarter_of_small_ones_is() {
         let usual = Matrix2::new(0.04, 0.01, 0.01, 0.09);
         let nothing = Matrix2::identity() * 1e-20;
-        let belief = Belief::new(std::iter::repeat_n(usual, 9).chain([nothing]));
-        assert_eq!(belief.of(usual), usual);
-        assert!((smallest(&belief.of(nothing)) / smallest(&usual) - 1.0).abs() < 1e-12);
+        let floor = CovarianceFloor::new(std::iter::repeat_n(usual, 9).chain([nothing]));
+        assert_eq!(floor.of(usual), usual);
+        assert!((smallest(&floor.of(nothing)) / smallest(&usual) - 1.0).abs() < 1e-12);
         // An edge is known well across and not at all along.
         let edge = Matrix2::new(1e4, 0.0, 0.0, 0.01);
-        assert_eq!(belief.of(edge), edge);
-        let belief = Belief::new(std::iter::repeat_n(usual, 6).chain(std::iter::repeat_n(nothing, 3)));
-        assert_eq!(belief.of(nothing), nothing);
+        assert_eq!(floor.of(edge), edge);
+        let floor = CovarianceFloor::new(std::iter::repeat_n(usual, 6).chain(std::iter::repeat_n(nothing, 3)));
+        assert_eq!(floor.of(nothing), nothing);
     }
 
     #[test]
@@ -232,7 +232,7 @@ mod tests {
         let diagonal = |scale: f64| DMatrix::from_diagonal(&DVector::from_vec(vec![scale, 1e-8 * scale]));
         let all: Vec<f64> =
             (0..8).flat_map(|k| diagonal(if k == 3 { 1e-20 } else { 1.0 }).as_slice().to_vec()).collect();
-        let believed = believed(&all, 2);
+        let believed = floored_covariances(&all, 2);
         assert_eq!(believed[..12], all[..12]);
         assert!((believed[12] - 1.0).abs() < 1e-12 && (believed[15] / 1e-8 - 1.0).abs() < 1e-12);
     }

@@ -1,7 +1,7 @@
 //! Whether the covariance of few patches holds: the experiment again, with noise by chance.
 //!
 //! The theory is linear and takes the surfaces in the weights for known. With few patches neither is so, and
-//! the errors have longer tails than a covariance from one linear step tells. The scene that was found is
+//! the errors have longer tails than a covariance from one linear step has. The scene that was found is
 //! measured again with new noise, and solved again: the errors in units of each repetition's own covariance
 //! are what the first one's are to be judged by (B. Efron 1979: the bootstrap).
 

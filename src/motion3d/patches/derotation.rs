@@ -3,7 +3,7 @@
 use super::system::{Patch, System};
 use super::{AffinePatches, cheapest, least_squares};
 use crate::motion3d::model::camera::affine_map;
-use crate::motion3d::model::derotation::HalfTurn;
+use crate::motion3d::model::derotation::Derotation;
 use crate::motion3d::model::input::Placement;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::options::MotionOptions;
@@ -15,7 +15,7 @@ const ROUNDING: f64 = 1e-13;
 
 /// The map from one view to the other is `I + M` to first order: with the slopes `D_1`, `D_2` of what turns
 /// both views it is `D_2 (I + M) D_1^-1`.
-pub(crate) fn turned_patch(given: &AffinePatches<'_>, k: usize, turn: &HalfTurn) -> Option<Patch> {
+pub(crate) fn turned_patch(given: &AffinePatches<'_>, k: usize, turn: &Derotation) -> Option<Patch> {
     let (mut m, at) = (Vector6::from(given.motion[k]), given.points[k]);
     let mut covariance = Matrix6::from_row_slice(&given.covariances[36 * k..36 * (k + 1)]);
     let mut ends = [at, [at[0] + m[0], at[1] + m[1]]];
@@ -37,13 +37,13 @@ pub(crate) fn turned_patch(given: &AffinePatches<'_>, k: usize, turn: &HalfTurn)
     Patch::new(turned.middle, &m, &covariance, Some(turn))
 }
 
-/// Patches with a rotation taken out that explains their flow as far as it can by itself.
+/// Patches with a rotation taken out that explains most of their flow by itself.
 pub(crate) fn beforehand(patches: &AffinePatches<'_>, options: &MotionOptions) -> System {
     let mut system = patches.system(options.placement, None);
     if options.placement == Placement::Midpoint {
         for _ in 0..TURNS {
             let Some(rotation) = least_squares(&system) else { break };
-            system = patches.system(options.placement, Some(&HalfTurn::new(&rotation.rotation)));
+            system = patches.system(options.placement, Some(&Derotation::new(&rotation.rotation)));
         }
     }
     system
@@ -61,7 +61,7 @@ pub(crate) fn settle(
     }
     for _ in 0..TURNS {
         let Some(w) = minima.first().map(Motion::w) else { break };
-        *system = patches.system(options.placement, Some(&HalfTurn::new(&w)));
+        *system = patches.system(options.placement, Some(&Derotation::new(&w)));
         *minima = cheapest(system, minima.iter().map(|motion| system.refine(motion)));
         if minima.first().is_some_and(|motion| (motion.w() - w).norm() < ROUNDING) {
             break;

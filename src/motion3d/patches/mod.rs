@@ -15,14 +15,14 @@ use crate::math::random::CounterRng;
 use crate::motion3d::bound::{MotionBound, check_truth, not_determined, too_few};
 use crate::motion3d::diagnostics::rotation_only::RotationOnly;
 use crate::motion3d::model::camera::{Intrinsics, to_plane};
-use crate::motion3d::model::derotation::HalfTurn;
+use crate::motion3d::model::derotation::Derotation;
 use crate::motion3d::model::input::{Noise, Placement, is_covariance, not_covariance};
 use crate::motion3d::model::motion::{Motion, Projection};
 use crate::motion3d::model::options::{Method, MotionOptions};
 use crate::motion3d::model::result::{CommonEffect, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use crate::motion3d::model::rows::tangents;
 use crate::motion3d::model::statistics::by_chance;
-use crate::motion3d::model::whitening::believed;
+use crate::motion3d::model::whitening::floored_covariances;
 use crate::motion3d::solver::covariance::{determined, inverse, plugged_in};
 use crate::motion3d::solver::starts::{apart, evaluate, sample};
 use bootstrap::wider;
@@ -57,7 +57,7 @@ const SEARCHED: usize = 200;
 const STARTS: usize = 5;
 const APART: f64 = 12.0;
 
-/// By how much a covariance may have to be widened for it to tell the shape of what is not known.
+/// By how much a covariance may have to be widened for it to describe the shape of the confidence region.
 const NONLINEAR: f64 = 4.0;
 
 impl AffinePatches<'_> {
@@ -79,7 +79,7 @@ impl AffinePatches<'_> {
     }
 
     /// The usable patches, whitened; with a `turn`, as displacements with that rotation taken out of them.
-    fn system(&self, placement: Placement, turn: Option<&HalfTurn>) -> System {
+    fn system(&self, placement: Placement, turn: Option<&Derotation>) -> System {
         let (mut patches, mut source) = (Vec::new(), Vec::new());
         for k in 0..self.points.len() {
             let patch = match turn {
@@ -117,11 +117,12 @@ impl AffinePatches<'_> {
 
 /// The rigid motion that explains the affine flow of patches.
 ///
-/// As [`estimate_motion`](crate::motion3d::estimate_motion), with six numbers a patch: maximum likelihood; then, from 5
+/// As [`estimate_motion`](crate::motion3d::estimate_motion), with six numbers a patch: maximum likelihood;
+/// then, from 5
 /// patches on, inverse depths and their slopes in the weights drawn to their distribution over the patches.
 /// Patches should be fits over windows of 30 px and more that do not overlap: numbers that share noise must
 /// come with covariances that say so. Other minima and opposite directions that no patch behind the camera
-/// excludes are told as for points.
+/// excludes are reported as for points.
 ///
 /// # Errors
 /// [`Error::Argument`] naming what has the wrong length: `flow`, `cov`; `robust`, `weight_inv_depth`,
@@ -140,7 +141,7 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
         _ => {}
     }
     options.common.check(Projection::Plane)?;
-    let covariances = believed(patches.covariances, 6);
+    let covariances = floored_covariances(patches.covariances, 6);
     let patches = AffinePatches { covariances: &covariances, ..*patches };
     Ok(options.threads.check()?.install(|| estimate(&patches, options)))
 }
@@ -152,7 +153,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     if used < LEAST {
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     }
-    if let Some(rotation) = turning(&system) {
+    if let Some(rotation) = explained_by_rotation(&system) {
         return turning_report(&system, n, &rotation, &options.common, &to_plane(patches.camera));
     }
     let rng = CounterRng::new(options.random_state);
@@ -207,7 +208,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     out
 }
 
-/// Patches at different places: those at one tell of no more surfaces, and of no more constraints, than one
+/// Patches at different places: those at one determine no more surfaces, and of no more constraints, than one
 /// of less noise.
 fn places(system: &System, points: &[[f64; 2]]) -> usize {
     let place = |&k: &u32| points[k as usize].map(f64::to_bits);
@@ -236,7 +237,7 @@ fn cheapest(system: &System, motions: impl Iterator<Item = Motion>) -> Vec<Motio
 }
 
 /// The rotation alone, where chance explains what it leaves.
-fn turning(system: &System) -> Option<RotationOnly> {
+fn explained_by_rotation(system: &System) -> Option<RotationOnly> {
     let found = least_squares(system)?;
     by_chance(found.chi2, (6 * system.patches.len() - 3) as f64).then_some(found)
 }
@@ -253,7 +254,8 @@ fn least_squares(system: &System) -> Option<RotationOnly> {
     Some(RotationOnly { rotation, covariance: factor.inverse(), chi2 })
 }
 
-/// As [`motion_bound`](crate::motion3d::motion_bound), for six numbers a patch whose true `(nu, nu_x, nu_y)` are given;
+/// As [`motion_bound`](crate::motion3d::motion_bound), for six numbers a patch whose true `(nu, nu_x, nu_y)`
+/// are given;
 /// their flow is not looked at.
 ///
 /// # Errors

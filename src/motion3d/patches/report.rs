@@ -1,8 +1,8 @@
-//! What is told about a motion of patches.
+//! Assembles the result for patches.
 
 use super::system::System;
 use crate::motion3d::diagnostics::contact::Rates;
-use crate::motion3d::diagnostics::report::turned;
+use crate::motion3d::diagnostics::report::report_rotation;
 use crate::motion3d::diagnostics::rotation_only::RotationOnly;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::options::CommonErrors;
@@ -11,7 +11,7 @@ use crate::motion3d::model::rows::{Matrix5, tangents};
 use crate::motion3d::solver::covariance::{direction_deviation, plugged_in};
 use nalgebra::{Matrix2, Vector3};
 
-/// Fills in what is told about a motion; whether the patches are one plane that has another motion too.
+/// Fills in the result of a motion; returns whether the patches are one plane that has another motion too.
 pub(crate) fn tell(
     out: &mut MotionEstimate,
     system: &System,
@@ -47,7 +47,7 @@ pub(crate) fn tell(
             rates.contact(surface[0], seen.covariance[(0, 0)], &slopes);
     }
     let distinct = (3.0 * out.direction_std).to_radians().max(1e-6);
-    match system.twin(motion) {
+    match system.planar_twin(motion) {
         Some(twin) if twin.angle_to(motion).min(twin.reversed().angle_to(motion)) > distinct => {
             out.alternatives.push(Alternative { motion: twin, excess: 0.0 });
             true
@@ -56,7 +56,7 @@ pub(crate) fn tell(
     }
 }
 
-/// What is told about a camera that only turns, or stands still.
+/// The result of a camera that only rotates, or stands still.
 ///
 /// `to_plane` maps flow to the plane at distance 1.
 pub(crate) fn turning_report(
@@ -67,9 +67,9 @@ pub(crate) fn turning_report(
     to_plane: &Matrix2<f64>,
 ) -> MotionEstimate {
     let mut out = MotionEstimate::nothing(n, Status::RotationOnly, 1.0);
-    let moved = rotation.covariance * system.turning() * to_plane;
+    let moved = rotation.covariance * system.translation_to_rotation() * to_plane;
     let covariance = rotation.covariance + common.added_to_rotation(&rotation.rotation, &moved);
-    turned(&mut out, &rotation.rotation, &covariance, rotation.chi2, &system.source);
+    report_rotation(&mut out, &rotation.rotation, &covariance, rotation.chi2, &system.source);
     out.surfaces = vec![[f64::NAN; 3]; n];
     for (patch, &source) in system.patches.iter().zip(&system.source) {
         let source = source as usize;

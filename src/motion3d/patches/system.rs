@@ -1,6 +1,6 @@
 //! The equations of whitened patches.
 
-use crate::motion3d::model::derotation::HalfTurn;
+use crate::motion3d::model::derotation::Derotation;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::result::Moved;
 use crate::motion3d::model::rows::{AffineRows, Matrix5, Vector5, tangents};
@@ -65,7 +65,12 @@ impl Patch {
     /// and the covariance positive definite.
     ///
     /// With a `turn`, that rotation was taken out of them: its part is put back as the rows have it.
-    pub fn new(point: [f64; 2], m: &Vector6<f64>, covariance: &Matrix6<f64>, turn: Option<&HalfTurn>) -> Option<Self> {
+    pub fn new(
+        point: [f64; 2],
+        m: &Vector6<f64>,
+        covariance: &Matrix6<f64>,
+        turn: Option<&Derotation>,
+    ) -> Option<Self> {
         let symmetric = 0.5 * (covariance + covariance.transpose());
         let whiten = symmetric.cholesky()?.l().try_inverse()?;
         let rows = AffineRows::new(point);
@@ -207,7 +212,7 @@ impl System {
     }
 
     /// `sum R_k^t L_k^-1` of one displacement of all flow.
-    pub fn turning(&self) -> Matrix3x2<f64> {
+    pub fn translation_to_rotation(&self) -> Matrix3x2<f64> {
         self.patches.iter().map(|patch| patch.r.transpose() * patch.whiten.fixed_columns::<2>(0)).sum()
     }
 
@@ -281,9 +286,9 @@ impl System {
         sum
     }
 
-    /// The other motion, where all patches lie in one plane `nu = n . eta` as far as their noise lets tell
+    /// The other motion, where all patches lie in one plane `nu = n . eta` within their noise
     /// and that has them before the camera.
-    pub fn twin(&self, motion: &Motion) -> Option<Motion> {
+    pub fn planar_twin(&self, motion: &Motion) -> Option<Motion> {
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
         let plane = |patch: &Patch| Matrix3::new(patch.point[0], patch.point[1], 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
         let seen: Vec<_> = self.patches.iter().map(|patch| (plane(patch), patch.seen(motion))).collect();

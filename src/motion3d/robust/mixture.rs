@@ -1,6 +1,7 @@
 //! The last steps towards the motion among points of which some are strays.
 //!
-//! With the probability `g(e)` of each point that it is an inlier ([`strays`](crate::motion3d::robust::outlier_posterior)), the estimating
+//! With the probability `g(e)` of each point that it is an inlier
+//! ([`strays`](crate::motion3d::robust::outlier_posterior)), the estimating
 //! equation is `sum g(e) e D(nu~)^t = 0`. Strays spread evenly add nothing to its mean, and nothing to its
 //! slope: when the motion moves, so does what of them obeys. So the slope is that of the inliers alone, the
 //! mean of `g e^2 D^t D` by parts, while the squares of `g e D` are those of all points: their mean is the

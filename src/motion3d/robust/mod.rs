@@ -19,7 +19,7 @@ use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{consensus as truncated, depths};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Scaled};
-use crate::motion3d::solver::refine::{Effort, FEWER, MANY, refine};
+use crate::motion3d::solver::refine::{FEWER, MANY, StoppingCriteria, refine};
 use crate::motion3d::solver::starts::sample;
 use competing_motions::{among_many_strays, rivals, second};
 use depth_consistency::Gate;
@@ -166,7 +166,8 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
         if kept.len() < LEAST {
             break;
         }
-        let motion = refine(&observations.subset(&kept), found.motion, None, Effort::of(observations.n)).motion;
+        let motion =
+            refine(&observations.subset(&kept), found.motion, None, StoppingCriteria::of(observations.n)).motion;
         let obeying = obeying(observations, &motion);
         found = Consensus::new(motion, obeying);
     }
@@ -254,7 +255,7 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
         if inliers.len() < LEAST {
             return None;
         }
-        motion = refine(&observations.subset(&inliers), motion, None, Effort::of(observations.n)).motion;
+        motion = refine(&observations.subset(&inliers), motion, None, StoppingCriteria::of(observations.n)).motion;
         let next = obeying(observations, &motion);
         // Of many points a few always lie on the border.
         let settled =

@@ -9,7 +9,7 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::tangents;
 use crate::motion3d::solver::covariance::{direction_block, inverse};
 use crate::motion3d::solver::neighbours::{Neighbours, Tree};
-use crate::motion3d::solver::refine::{Effort, refine};
+use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use std::ops::Range;
 
 /// Neighbours that are looked at; points from which on there are enough of them.
@@ -73,7 +73,7 @@ impl Around {
     }
 }
 
-/// The inliers among which hardly a point is of a thing that moves by itself.
+/// The inliers among which hardly a point is of a object that moves by itself.
 pub(crate) struct Inner {
     /// Those with hardly a rejected neighbour; all of them, where few would be left.
     pub inliers: Vec<u32>,
@@ -131,7 +131,7 @@ fn without(observations: &Observations, found: &Consensus, around: &Around) -> (
         if kept == inliers || kept.len() < LEAST {
             break;
         }
-        motion = refine(&observations.subset(&kept), motion, None, Effort::of(observations.n)).motion;
+        motion = refine(&observations.subset(&kept), motion, None, StoppingCriteria::of(observations.n)).motion;
         inliers = kept;
         quiet = rejected.iter().map(|&share| share <= limit).collect();
     }

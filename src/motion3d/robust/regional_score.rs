@@ -8,7 +8,7 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::model::statistics::chi2_deviation;
 use crate::motion3d::solver::neighbours::Tree;
-use crate::motion3d::solver::refine::{Effort, refine};
+use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use nalgebra::SymmetricEigen;
 use std::ops::Range;
 
@@ -35,7 +35,7 @@ pub(crate) fn pulling(observations: &Observations, motion: &Motion, points: &[u3
 
 fn departing(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
     let own = observations.subset(points);
-    let least = refine(&own, *motion, None, Effort::FULL);
+    let least = refine(&own, *motion, None, StoppingCriteria::FULL);
     let whiten = least.equations.h.cholesky()?.l();
     let seen = depths(&own, &least.motion);
     let row = |k: usize| whiten.solve_lower_triangular(&slopes(&own, &least.motion, &least.tangent, seen.nu[k], k));

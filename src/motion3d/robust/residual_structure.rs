@@ -8,7 +8,7 @@ use crate::math::random::CounterRng;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::solver::refine::{Effort, refine};
+use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 
 /// Residuals whose mean square, in units of noise, is less than this do not matter.
 const LITTLE: f64 = 0.25;
@@ -31,7 +31,7 @@ const EACH: f64 = 0.12;
 pub(crate) fn instead(observations: &Observations, found: &Motion, points: &[u32], rng: CounterRng) -> Option<Rival> {
     let mut parts = otherwise(observations, found, points)?;
     let own = observations.subset(points);
-    let (n, together) = (own.n as f64, refine(&own, *found, None, Effort::FULL).equations.cost);
+    let (n, together) = (own.n as f64, refine(&own, *found, None, StoppingCriteria::FULL).equations.cost);
     let division = Division::of(own);
     if parts.is_empty() {
         parts = division.quarters();

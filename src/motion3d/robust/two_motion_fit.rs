@@ -7,7 +7,7 @@ use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::neighbours::{Neighbours, Tree};
-use crate::motion3d::solver::refine::{Effort, refine};
+use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 
 /// Neighbours that say with a point which motion it has: things that move by themselves are whole.
 const NEAREST: usize = 8;
@@ -65,7 +65,7 @@ impl Division {
                 *motion = if round < ANEW {
                     Narrowing::new(&members).motions(1, rng).pop()?
                 } else {
-                    refine(&members, *motion, None, Effort::ROUGH).motion
+                    refine(&members, *motion, None, StoppingCriteria::ROUGH).motion
                 };
             }
             let next = self.nearer(&motions);
@@ -78,7 +78,8 @@ impl Division {
         if members.iter().any(|members| members.n <= LEAST) {
             return None;
         }
-        let fitted: [_; 2] = std::array::from_fn(|own| refine(&members[own], motions[own], None, Effort::FULL));
+        let fitted: [_; 2] =
+            std::array::from_fn(|own| refine(&members[own], motions[own], None, StoppingCriteria::FULL));
         let cost = fitted.iter().map(|minimum| minimum.equations.cost).sum();
         let signed: [Motion; 2] = std::array::from_fn(|own| cheaper_sign(&members[own], fitted[own].motion).0);
         let motions = if members[0].n < members[1].n { [signed[1], signed[0]] } else { signed };
@@ -123,7 +124,7 @@ mod tests {
             }
             let part: Vec<u32> = (0..400).filter(|&k| scene.points[k as usize][0] > 0.0).collect();
             let points = scene.observations();
-            let one = refine(&points, oblique(), None, Effort::FULL).equations.cost;
+            let one = refine(&points, oblique(), None, StoppingCriteria::FULL).equations.cost;
             let division = Division::of(points);
             let two = division.from(&part, &oblique(), CounterRng::new(seed)).unwrap();
             let off = [(0, oblique()), (1, thing)].map(|(k, truth)| two.motions[k].angle_to(&truth).to_degrees());
@@ -135,7 +136,7 @@ mod tests {
     #[test]
     fn points_that_move_as_one_have_no_second_motion_that_is_worth_it() {
         let points = Scene::oblique(300, 0.02, 1).observations();
-        let one = refine(&points, oblique(), None, Effort::FULL).equations.cost;
+        let one = refine(&points, oblique(), None, StoppingCriteria::FULL).equations.cost;
         let division = Division::of(points);
         let two = division.from(&(0..100).collect::<Vec<u32>>(), &oblique(), CounterRng::new(1));
         assert!(two.is_none_or(|two| two.cost > 0.75 * one));

@@ -16,7 +16,7 @@ const ROUNDING: f64 = 1e-12;
 
 /// What the data say about the covariance of maximum likelihood and the bound.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Plugged {
+pub(crate) struct PluginCovariances {
     /// (17): `M^-1 H M^-1` with `M = H - P`.
     pub likelihood: Matrix5,
     /// `M^-1`.
@@ -44,11 +44,11 @@ pub(crate) fn determined(information: &Matrix5) -> Option<Matrix5> {
 ///
 /// `E[H] = M + P`: noisy depths add to the products that the information is made of, so that the usual `H^-1`
 /// lies below the bound.
-pub(crate) fn plugged(equations: &Equations) -> Option<Plugged> {
+pub(crate) fn plugged(equations: &Equations) -> Option<PluginCovariances> {
     plugged_in(&equations.h, &equations.p)
 }
 
-pub(crate) fn plugged_in(h: &Matrix5, p: &Matrix5) -> Option<Plugged> {
+pub(crate) fn plugged_in(h: &Matrix5, p: &Matrix5) -> Option<PluginCovariances> {
     let factor = h.cholesky()?.l();
     let whiten = factor.try_inverse()?;
     let noise = whiten * p * whiten.transpose();
@@ -60,7 +60,7 @@ pub(crate) fn plugged_in(h: &Matrix5, p: &Matrix5) -> Option<Plugged> {
     }
     let bound = inverse(&(h - p))?;
     let likelihood = bound * h * bound;
-    Some(Plugged { likelihood: 0.5 * (likelihood + likelihood.transpose()), bound })
+    Some(PluginCovariances { likelihood: 0.5 * (likelihood + likelihood.transpose()), bound })
 }
 
 /// The 2 x 2 block of the direction.

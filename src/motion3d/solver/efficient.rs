@@ -1,7 +1,7 @@
 //! The estimating equation with smoothed depths in its weights.
 
-use super::covariance::{Plugged, damping, direction_deviation, inverse};
-use super::profile_likelihood::{Valley, among};
+use super::covariance::{PluginCovariances, damping, direction_deviation, inverse};
+use super::profile_likelihood::{ProfileLikelihood, among};
 use super::refine::Minimum;
 use super::smoothing::{DepthSmoother, Smoothed};
 use crate::motion3d::kernels::{Bilinear, depths, information, slope};
@@ -37,9 +37,9 @@ pub(crate) struct Efficient {
 }
 
 impl Efficient {
-    /// The covariance with what a valley that bends and widens adds, and whether it tells the valley.
+    /// The covariance with what a curved profile likelihood adds, and whether it describes that.
     pub fn lengthened(&self, observations: &Observations, smoother: impl Fn() -> DepthSmoother) -> (Matrix5, bool) {
-        let valley = Valley { observations, motion: &self.motion, tangent: &self.tangent };
+        let valley = ProfileLikelihood { observations, motion: &self.motion, tangent: &self.tangent };
         let mut made = None;
         valley.lengthened(&self.covariance, |motion: &Motion| {
             if self.variance.is_none() {
@@ -53,7 +53,7 @@ impl Efficient {
 /// Where weights have their depths from.
 #[derive(Debug)]
 pub(crate) enum WeightDepths<'a> {
-    /// Smoothed anew at each motion.
+    /// Smoothed again at each motion.
     Smoothed(&'a mut DepthSmoother),
     /// Known from elsewhere, as long as the planes.
     Known(Vec<f64>),
@@ -68,7 +68,7 @@ impl WeightDepths<'_> {
     }
 
     /// What known depths are to be multiplied with to be in the unit of the translation, by least squares
-    /// against the depths of the flow; `None` where these do not tell: such depths say nothing about the
+    /// against the depths of the flow; `None` where these are unrelated: such depths say nothing about the
     /// scene.
     fn unit(&self, observations: &Observations, motion: &Motion) -> Option<f64> {
         let Self::Known(given) = self else { return Some(1.0) };
@@ -117,7 +117,7 @@ pub(crate) fn efficient(
             break;
         }
     }
-    told(observations, motion, smooth, matches!(weights, WeightDepths::Known(_)).then_some(unit))
+    with_covariance(observations, motion, smooth, matches!(weights, WeightDepths::Known(_)).then_some(unit))
 }
 
 /// The same without a solution: what the weights say about the covariance at `motion`.
@@ -127,11 +127,16 @@ pub(crate) fn unsolved(
     mut weights: WeightDepths<'_>,
 ) -> Option<Efficient> {
     let smooth = weights.at(observations, motion);
-    told(observations, *motion, smooth, None)
+    with_covariance(observations, *motion, smooth, None)
 }
 
 /// `known`: the unit of depths that are known from elsewhere.
-fn told(observations: &Observations, motion: Motion, smooth: Smoothed, known: Option<f64>) -> Option<Efficient> {
+fn with_covariance(
+    observations: &Observations,
+    motion: Motion,
+    smooth: Smoothed,
+    known: Option<f64>,
+) -> Option<Efficient> {
     let tangent = tangents(&motion.u());
     let covariance = match known {
         Some(unit) => {
@@ -145,7 +150,7 @@ fn told(observations: &Observations, motion: Motion, smooth: Smoothed, known: Op
 }
 
 /// Eigenvalues that the slope may have relative to the weights' squares: beyond, the points' own depths are
-/// too noisy to tell it.
+/// too noisy to determine it.
 const SLOPES: std::ops::Range<f64> = 0.25..4.0;
 
 /// The least singular value of the slope relative to the largest at which known depths determine the motion.
@@ -219,7 +224,7 @@ fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> Option<Moti
 pub(crate) const NOISY: f64 = 1.3;
 
 /// Whether (17) cannot be trusted: the noise of the depths matters, and the epipole may lie among the points.
-pub(crate) fn beyond_theory(observations: &Observations, minimum: &Minimum, plugged: &Plugged) -> bool {
+pub(crate) fn beyond_theory(observations: &Observations, minimum: &Minimum, plugged: &PluginCovariances) -> bool {
     let deviation = direction_deviation(&plugged.likelihood);
     if deviation < NOISY * direction_deviation(&plugged.bound) {
         return false;
@@ -229,7 +234,7 @@ pub(crate) fn beyond_theory(observations: &Observations, minimum: &Minimum, plug
 
 /// Mean square error of the minimum as the better solution has it, `C + d d^t` with their difference `d`, in
 /// the minimum's axes.
-pub(crate) fn departure(minimum: &Minimum, better: &Efficient) -> Matrix5 {
+pub(crate) fn nonlinearity_covariance(minimum: &Minimum, better: &Efficient) -> Matrix5 {
     let along: Vector2<f64> = minimum.tangent * better.motion.u();
     let turn = better.motion.w() - minimum.motion.w();
     let apart = Vector5::from_column_slice(&[along.x, along.y, turn.x, turn.y, turn.z]);

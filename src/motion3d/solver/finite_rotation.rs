@@ -1,21 +1,22 @@
-//! Which rotation is taken out of displacements, and when that is worth its while.
+//! Which rotation is taken out of displacements, and when that matters.
 //!
 //! Half way between both ends a displacement is the instantaneous flow to second order. The rest, of third
 //! order in rotation and translation, is in no covariance; rows that have the motion's own rotation taken out
-//! of them ([`turned`](crate::motion3d::model::derotation)) have none. Where the rest would move an estimate by a small share of
+//! of them ([`derotation`](crate::motion3d::model::derotation)) have none. Where the rest would move an
+//! estimate by a small share of
 //! its deviation, nothing is turned.
 
 use super::likelihood::{cost_tolerance, different};
-use super::refine::{Effort, Minimum, refine};
+use super::refine::{Minimum, StoppingCriteria, refine};
 use super::starts::at_most;
 use crate::math::quantile;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{depths, slopes};
-use crate::motion3d::model::derotation::HalfTurn;
+use crate::motion3d::model::derotation::Derotation;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
-use crate::motion3d::model::whitening::Intake;
+use crate::motion3d::model::whitening::Whitening;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -27,7 +28,7 @@ const FIRST: usize = 200;
 /// Squared shift of an estimate, in its deviations, that is negligible.
 const NEGLIGIBLE: f64 = 0.01;
 
-/// The same once rows are turned anyway: of [`MANY`] points another round costs more than it tells; and the
+/// The same once rows are turned anyway: of [`MANY`] points another round costs more than it gains; and the
 /// change of the rotation, rad, that is rounding.
 const SETTLED: f64 = 1e-14;
 const ROUGHLY: f64 = 1e-3;
@@ -38,7 +39,7 @@ const ROUNDING: f64 = 1e-13;
 /// of the motion.
 const HIDDEN: f64 = 0.1;
 
-/// Root mean square of the rest, in units of noise, that decides of hardly a point whether it obeys.
+/// Root mean square of the rest, in units of noise, that changes few inliers.
 const OBEYING: f64 = 0.1;
 
 /// The farthest, degrees, that a minimum may come from itself under another one's rotation.
@@ -63,9 +64,13 @@ const TURNS: usize = 3;
 
 /// By how much the residuals of `motion` would change if the points were turned about its rotation, at a
 /// sample of them.
-fn changes<'a>(intake: &Intake<'_>, points: &'a Observations, motion: &Motion) -> (Cow<'a, Observations>, Vec<f64>) {
+fn changes<'a>(
+    whitening: &Whitening<'_>,
+    points: &'a Observations,
+    motion: &Motion,
+) -> (Cow<'a, Observations>, Vec<f64>) {
     let few = at_most(points, SAMPLED, CounterRng::new(0));
-    let (here, turned) = (depths(&few, motion), intake.turned(&few, motion.derotation()));
+    let (here, turned) = (depths(&few, motion), whitening.derotated(&few, motion.derotation()));
     let changes = if few.turn.is_some() {
         let there = depths(&turned, motion);
         there.e.iter().zip(&here.e).map(|(there, here)| there - here).take(few.n).collect()
@@ -86,13 +91,13 @@ fn half_way_residual(turned: &Observations, motion: &Motion, k: usize) -> f64 {
     if s2 > turned.floor { (t.y * left.x - t.x * left.y) / s2.sqrt() } else { 0.0 }
 }
 
-/// The square of what an estimate would come out otherwise by, in its deviations, if the points were turned
+/// The squared shift of an estimate, in its standard deviations, if the points were derotated
 /// about its rotation: `g^t H^-1 g` of the changes' `g = sum D^t de`.
-pub(crate) fn shift(intake: &Intake<'_>, points: &Observations, motion: &Motion) -> f64 {
+pub(crate) fn shift(whitening: &Whitening<'_>, points: &Observations, motion: &Motion) -> f64 {
     if !points.displaced {
         return 0.0;
     }
-    let (few, changes) = changes(intake, points, motion);
+    let (few, changes) = changes(whitening, points, motion);
     let tangent = tangents(&motion.u());
     let nu = depths(&few, motion).nu;
     let (mut h, mut g) = (Matrix5::zeros(), Vector5::zeros());
@@ -108,16 +113,16 @@ pub(crate) fn shift(intake: &Intake<'_>, points: &Observations, motion: &Motion)
 }
 
 /// Whether turning the points about the rotation of `motion` would move its estimate.
-pub(crate) fn matters(intake: &Intake<'_>, points: &Observations, motion: &Motion) -> bool {
-    shift(intake, points, motion) > NEGLIGIBLE
+pub(crate) fn matters(whitening: &Whitening<'_>, points: &Observations, motion: &Motion) -> bool {
+    shift(whitening, points, motion) > NEGLIGIBLE
 }
 
-/// Whether it would decide otherwise of points that obey.
-pub(crate) fn decides(intake: &Intake<'_>, points: &Observations, motion: &Motion) -> bool {
+/// Whether it would change which points are inliers.
+pub(crate) fn decides(whitening: &Whitening<'_>, points: &Observations, motion: &Motion) -> bool {
     if !points.displaced {
         return false;
     }
-    let (_, changes) = changes(intake, points, motion);
+    let (_, changes) = changes(whitening, points, motion);
     changes.iter().map(|change| change * change).sum::<f64>() > OBEYING * OBEYING * changes.len() as f64
 }
 
@@ -127,7 +132,7 @@ pub(crate) fn decides(intake: &Intake<'_>, points: &Observations, motion: &Motio
 /// What is left of the flow is short, and so is the rest of third order: even a search that knows nothing of
 /// the motion then sees exact flow, nearly. Of noise that is `unknown` anything may be more.
 pub(crate) fn beforehand(
-    intake: &Intake<'_>,
+    whitening: &Whitening<'_>,
     points: &Observations,
     (robust, unknown): (bool, bool),
     rng: CounterRng,
@@ -139,25 +144,26 @@ pub(crate) fn beforehand(
     let again =
         |points: &Observations, w| if robust { Some(reweighted(points, w)) } else { least_squares(points, |_| 1.0) };
     let mut w = again(few, if robust { likeliest(few, rng.stream(1))? } else { Vector3::zeros() })?;
-    let mut turned = intake.turned(few, HalfTurn::new(&w));
+    let mut turned = whitening.derotated(few, Derotation::new(&w));
     let hidden = if unknown { 0.0 } else { HIDDEN * 2.0 * (points.n as f64).sqrt() };
     if rest(few, &turned, &w) * points.n as f64 <= hidden {
         return None;
     }
     for _ in 0..TURNS {
         w = again(&turned, w)?;
-        turned = intake.turned(few, HalfTurn::new(&w));
+        turned = whitening.derotated(few, Derotation::new(&w));
     }
-    Some(intake.turned(points, HalfTurn::new(&w)))
+    Some(whitening.derotated(points, Derotation::new(&w)))
 }
 
-/// The points with the rotation taken out that explains most of their flow by itself, whatever was taken out
+/// The points with the rotation taken out that explains most of their flow by itself, regardless of what was
+/// taken out
 /// before; `None` where there is none.
-pub(crate) fn afresh(intake: &Intake<'_>, points: &Observations) -> Option<Observations> {
-    let mut turned = intake.turned(points, HalfTurn::new(&Vector3::zeros()));
+pub(crate) fn afresh(whitening: &Whitening<'_>, points: &Observations) -> Option<Observations> {
+    let mut turned = whitening.derotated(points, Derotation::new(&Vector3::zeros()));
     for _ in 0..=TURNS {
         let w = least_squares(&turned, |_| 1.0)?;
-        turned = intake.turned(points, HalfTurn::new(&w));
+        turned = whitening.derotated(points, Derotation::new(&w));
     }
     Some(turned)
 }
@@ -178,14 +184,14 @@ fn rest(points: &Observations, turned: &Observations, w: &Vector3<f64>) -> f64 {
 /// out to be much larger once its own rotation is taken out, or that is quite another one, the other minima
 /// are followed, too, and only those stay that are as good as the best.
 pub(crate) fn settle(
-    intake: &Intake<'_>,
+    whitening: &Whitening<'_>,
     all: &mut Observations,
     inliers: &mut Observations,
     found: &mut Vec<Minimum>,
     lead: &Minimum,
     unknown: bool,
 ) {
-    let follow = |minimum: &Minimum| follow(intake, inliers, *minimum, unknown);
+    let follow = |minimum: &Minimum| follow(whitening, inliers, *minimum, unknown);
     let others: Vec<Minimum> = found.iter().filter(|other| other.motion != lead.motion).copied().collect();
     let own = follow(lead);
     let limit = |cost: f64| cost + cost_tolerance(inliers.n) * noise(cost, inliers.n, unknown);
@@ -193,7 +199,7 @@ pub(crate) fn settle(
     let stayed = (own.minimum.motion.w() - before).norm() < WANDERED;
     let (again, turned) = if others.is_empty() || stayed && own.cost <= limit(lead.equations.cost) {
         let Some(turned) = own.turned else { return };
-        let again = |minimum: &Minimum| refine(&turned, minimum.motion, None, Effort::ROUGH);
+        let again = |minimum: &Minimum| refine(&turned, minimum.motion, None, StoppingCriteria::ROUGH);
         let again = different(others.par_iter().map(again).chain([own.minimum]).collect());
         (again, turned)
     } else {
@@ -204,7 +210,7 @@ pub(crate) fn settle(
         let good = followed.iter().filter(|other| other.cost <= limit(best.cost));
         let turned = best.turned.as_ref().unwrap_or(inliers).clone();
         let again = |other: &Followed| {
-            let there = refine(&turned, other.minimum.motion, None, Effort::ROUGH);
+            let there = refine(&turned, other.minimum.motion, None, StoppingCriteria::ROUGH);
             (there.motion.angle_to(&other.minimum.motion).to_degrees() < APART).then_some(there)
         };
         (different(good.filter_map(again).chain([best.minimum]).collect()), turned)
@@ -215,7 +221,7 @@ pub(crate) fn settle(
     }
     (*found, *inliers) = (again, turned);
     if let Some(turn) = inliers.turn {
-        *all = if all.n == inliers.n { inliers.clone() } else { intake.turned(all, turn) };
+        *all = if all.n == inliers.n { inliers.clone() } else { whitening.derotated(all, turn) };
     }
 }
 
@@ -234,7 +240,7 @@ struct Followed {
 }
 
 /// Turns the points about the rotation of a minimum until that stays.
-fn follow(intake: &Intake<'_>, points: &Observations, mut minimum: Minimum, unknown: bool) -> Followed {
+fn follow(whitening: &Whitening<'_>, points: &Observations, mut minimum: Minimum, unknown: bool) -> Followed {
     let settled = if points.n < MANY { SETTLED } else { ROUGHLY };
     let mut negligible = if points.turn.is_some() { settled } else { NEGLIGIBLE };
     let mut turned: Option<Observations> = None;
@@ -242,12 +248,13 @@ fn follow(intake: &Intake<'_>, points: &Observations, mut minimum: Minimum, unkn
         let here = turned.as_ref().unwrap_or(points);
         let w = minimum.motion.w();
         let same = here.turn.is_some_and(|turn| (turn.rotation - w).norm() < ROUNDING);
-        if same || shift(intake, here, &minimum.motion) <= negligible * noise(minimum.equations.cost, points.n, unknown)
+        if same
+            || shift(whitening, here, &minimum.motion) <= negligible * noise(minimum.equations.cost, points.n, unknown)
         {
             break;
         }
-        let next = intake.turned(here, minimum.motion.derotation());
-        minimum = refine(&next, minimum.motion, None, Effort::of(next.n));
+        let next = whitening.derotated(here, minimum.motion.derotation());
+        minimum = refine(&next, minimum.motion, None, StoppingCriteria::of(next.n));
         turned = Some(next);
         negligible = settled;
     }
@@ -294,7 +301,7 @@ fn reweighted(points: &Observations, start: Vector3<f64>) -> Vector3<f64> {
     let mut w = start;
     for _ in 0..STEPS {
         let cut = CUT * CUT * deciding(points, &w).max(f64::MIN_POSITIVE);
-        // Where hardly a point counts the last rotation was better.
+        // Where few points count the last rotation was better.
         let Some(next) = least_squares(points, |k| (1.0 - left(points, k, &w) / cut).max(0.0).powi(2)) else { break };
         let settled = (next - w).norm() < ROUNDING;
         w = next;

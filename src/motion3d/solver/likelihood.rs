@@ -2,7 +2,7 @@
 
 use super::covariance::direction_deviation;
 use super::efficient::{Efficient, WeightDepths, efficient};
-use super::refine::{Effort, FEWER, MANY, Minimum, refine};
+use super::refine::{FEWER, MANY, Minimum, StoppingCriteria, refine};
 use super::smoothing::DepthSmoother;
 use super::starts::{Searched, sample};
 use crate::math::random::CounterRng;
@@ -49,7 +49,7 @@ impl Candidate {
 
     /// `J` and those depths behind the camera that noise does not lead there.
     fn without_noise(&self) -> f64 {
-        self.minimum.equations.cost + self.minimum.equations.signs()
+        self.minimum.equations.cost + self.minimum.equations.cheirality_cost()
     }
 }
 
@@ -80,7 +80,7 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
     let refined = if observations.n > MANY {
         let fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(1)));
         let rough: Vec<Minimum> =
-            starts.into_par_iter().map(|start| refine(&fewer, start, None, Effort::ROUGH)).collect();
+            starts.into_par_iter().map(|start| refine(&fewer, start, None, StoppingCriteria::ROUGH)).collect();
         let smoother = || DepthSmoother::new(&fewer, Smoother::Auto, rng.stream(6));
         let rough = different(rough);
         let mut finalists: Vec<Candidate> = rough.iter().map(|minimum| Candidate::signed(&fewer, minimum)).collect();
@@ -94,23 +94,24 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
                 finalists.push(added);
             }
         }
-        // What leaves more on few points than chance explains need not be followed on many, whatever its
+        // What leaves more on few points than chance explains need not be followed on many, regardless of its
         // signs and depths. (Signs do not decide here: at a minimum that is not reached yet they are of other
         // depths.)
         let left = |finalist: &Candidate| finalist.minimum.equations.cost;
         let least = finalists.iter().map(left).fold(f64::INFINITY, f64::min);
         let limit = least + cost_tolerance(fewer.n) * (least / fewer.n as f64).max(1.0);
         finalists.retain(|finalist| left(finalist) <= limit);
-        let followed =
-            |candidate: &Candidate| refine(observations, *candidate.motion(), None, Effort::of(observations.n));
+        let followed = |candidate: &Candidate| {
+            refine(observations, *candidate.motion(), None, StoppingCriteria::of(observations.n))
+        };
         finalists.iter().map(followed).collect()
     } else {
-        starts.into_par_iter().map(|start| refine(observations, start, None, Effort::FULL)).collect()
+        starts.into_par_iter().map(|start| refine(observations, start, None, StoppingCriteria::FULL)).collect()
     };
     different(refined)
 }
 
-/// Sorted by cost, each minimum once, whatever its sign.
+/// Sorted by cost, each minimum once, of either sign.
 pub(crate) fn different(mut minima: Vec<Minimum>) -> Vec<Minimum> {
     minima.retain(|minimum| minimum.equations.cost.is_finite());
     minima.sort_by(|a, b| a.equations.cost.total_cmp(&b.equations.cost));

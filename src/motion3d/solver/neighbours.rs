@@ -1,4 +1,4 @@
-//! The nearest points of every point, by a k-d tree. Points are told by their place in the tree, where
+//! The nearest points of every point, by a k-d tree. Points are named by their place in the tree, where
 //! neighbours are near each other in memory too. Which of several points at the same distance are kept
 //! depends on the points alone.
 
@@ -10,7 +10,7 @@ const LEAF: usize = 12;
 /// Points whose neighbours one task looks for.
 const BAND: usize = 256;
 
-/// Numbers of neighbours that are told apart: the first 8 in a list are the 8 nearest, the first 16 the 16
+/// Numbers of neighbours that are kept apart: the first 8 in a list are the 8 nearest, the first 16 the 16
 /// nearest, ...
 pub(crate) const SIZES: [usize; 4] = [8, 16, 32, 64];
 
@@ -39,7 +39,7 @@ pub(crate) struct Neighbours {
 }
 
 impl Neighbours {
-    /// The nearest of the `i`-th point asked for, nested as [`SIZES`] says.
+    /// The nearest of the `i`-th requested point, nested as [`SIZES`] says.
     pub fn of(&self, i: usize) -> &[u32] {
         &self.places[i * self.k..(i + 1) * self.k]
     }

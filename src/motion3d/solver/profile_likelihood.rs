@@ -1,11 +1,13 @@
 //! What a covariance leaves out where the direction is known to a large share of the field only.
 //!
 //! It is that of the information *at the estimate*. Along the direction that is known least, depths, and with
-//! them what the points tell, change: an estimate that is off may seem to know the motion much better than
+//! them the information of the points, change: an estimate that is off may seem to know the motion much
+//! better than
 //! one that is right. So the confidence interval of that one unknown is looked for where it ends: where the
 //! estimating equation, with weights smoothed *there* and the other unknowns solved for, is off by as much as
 //! chance makes it in one case of twenty (C. Rao's score test, 1948, which needs the truth of the place only,
-//! not an estimate there). The deviation that has these ends is told, with the bend of the valley that they
+//! not an estimate there). The deviation that has these ends is reported, with the bend of the valley that
+//! they
 //! show, and with what the other unknowns are known to there.
 
 use super::covariance::{damping, direction_block, direction_deviation, inverse};
@@ -35,7 +37,7 @@ const LONGEST: f64 = 2.0;
 /// The farthest that is looked, rad: farther the direction is not known.
 const FARTHEST: f64 = 1.5;
 
-/// The direction's deviation as a share of the field beyond which no covariance tells the shape of the
+/// The direction's deviation as a share of the field beyond which no covariance describes the shape of the
 /// valley, whose every bend counts.
 const BEYOND: f64 = 1.5;
 
@@ -51,8 +53,8 @@ const SIMPSON: f64 = 1.0 / 6.0;
 
 type Vector4 = SMatrix<f64, 4, 1>;
 use crate::motion3d::model::rows::Vector5;
-/// An estimate whose covariance is asked.
-pub(crate) struct Valley<'a> {
+/// An estimate whose covariance is computed.
+pub(crate) struct ProfileLikelihood<'a> {
     pub observations: &'a Observations,
     pub motion: &'a Motion,
     pub tangent: &'a Matrix2x3<f64>,
@@ -76,9 +78,9 @@ struct End {
     covariance: Matrix4<f64>,
 }
 
-impl Valley<'_> {
+impl ProfileLikelihood<'_> {
     /// How many axes of the direction, the one that is known least first, have a covariance that the theory
-    /// at the estimate does not tell.
+    /// at the estimate does not describe.
     pub fn bent(&self, covariance: &Matrix5) -> usize {
         let deviation = direction_deviation(covariance);
         let share = deviation.to_radians() / spread(&self.observations.site);
@@ -97,7 +99,8 @@ impl Valley<'_> {
     }
 
     /// The covariance with what a curved and widening valley adds; the same where the direction is known well
-    /// beside the field. `weights`: the depths that weigh the equations at a motion. And whether that tells
+    /// beside the field. `weights`: the depths that weigh the equations at a motion. And whether that
+    /// describes
     /// the valley: it has ends, and is not so long that a covariance has none of its shape.
     pub fn lengthened(&self, covariance: &Matrix5, mut weights: impl FnMut(&Motion) -> Vec<f64>) -> (Matrix5, bool) {
         let axes = self.bent(covariance);
@@ -185,7 +188,7 @@ impl Valley<'_> {
             // The bend is carried on as a square.
             rest = slope * next + (there.rest - slope * psi) * (next / psi).powi(2);
             if settled {
-                // An error of the direction is told as its part along the axes.
+                // An error of the direction is its part along the axes.
                 let scale = 1.0 / self.off(from.axes, next, rest[0]).norm();
                 rest[0] *= scale;
                 return Some(End { psi: next * scale, rest, ..there });
@@ -268,7 +271,7 @@ fn floor(
     None
 }
 
-/// Points that tell how far all of them spread.
+/// Points from which the spread of all is computed.
 const ENOUGH: usize = 1000;
 
 /// Root mean square distance of points from their middle.

@@ -18,16 +18,16 @@ const NEAR: f64 = 0.3;
 
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Effort {
+pub(crate) struct StoppingCriteria {
     /// Most steps.
     pub steps: usize,
     /// Length of a step `(psi, w)`, rad, that is not worth another.
     pub tolerance: f64,
-    /// The same in deviations of what is found, as far as its residuals tell these.
+    /// The same in deviations of what is found, estimated from its residuals.
     pub deviations: f64,
 }
 
-impl Effort {
+impl StoppingCriteria {
     /// To leave a motion as it is.
     pub const NONE: Self = Self { steps: 0, tolerance: 0.0, deviations: 0.0 };
     /// For a start that will be refined again.
@@ -36,7 +36,7 @@ impl Effort {
     pub const FULL: Self = Self { steps: 60, tolerance: 1e-10, deviations: 0.0 };
 
     /// To the minimum of `n` points: of many a step costs much, and after one that is short beside the
-    /// deviation hardly anything is left.
+    /// deviation little is left.
     pub const fn of(n: usize) -> Self {
         if n > MANY { Self { deviations: 1e-3, ..Self::FULL } } else { Self::FULL }
     }
@@ -79,7 +79,7 @@ fn step(equations: &Equations, n: usize, damping: f64) -> Option<Vector5> {
     if near { solved(h - p) } else { Some(careful) }
 }
 
-/// The square of a step in deviations of what is found, as far as residuals of `n` points tell these.
+/// The square of a step in deviations of what is found, estimated from residuals of `n` points.
 fn squared_deviations(equations: &Equations, step: &Vector5, n: usize) -> f64 {
     step.dot(&(equations.h * step)) * n as f64 / equations.cost
 }
@@ -89,7 +89,12 @@ fn squared_deviations(equations: &Equations, step: &Vector5, n: usize) -> f64 {
 ///
 /// The slope of `e` is `-D(nu^)` exactly: farther than [`NEAR`] from the minimum these are Gauss-Newton
 /// steps.
-pub(crate) fn refine(observations: &Observations, start: Motion, cut: Option<f64>, effort: Effort) -> Minimum {
+pub(crate) fn refine(
+    observations: &Observations,
+    start: Motion,
+    cut: Option<f64>,
+    effort: StoppingCriteria,
+) -> Minimum {
     let mut here = Minimum::at(observations, start, cut);
     let mut damping = 1e-4;
     for _ in 0..effort.steps {
@@ -147,7 +152,7 @@ mod tests {
     fn exact_flow_gives_the_exact_motion() {
         let scene = Scene::oblique(60, 0.0, 3);
         let near = Motion::of(&(scene.motion.u() + Vector3::new(0.05, -0.04, 0.02)).normalize(), &Vector3::zeros());
-        let found = refine(&scene.observations(), near, None, Effort::FULL);
+        let found = refine(&scene.observations(), near, None, StoppingCriteria::FULL);
         assert!(found.motion.angle_to(&scene.motion) < 1e-9);
         assert!((found.motion.w() - scene.motion.w()).norm() < 1e-9);
     }
@@ -157,11 +162,12 @@ mod tests {
     #[test]
     fn noisy_depths_do_not_shorten_steps() {
         let observations = Scene::oblique(20000, 0.3, 5).observations();
-        let least = refine(&observations, Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]), None, Effort::FULL);
+        let least =
+            refine(&observations, Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]), None, StoppingCriteria::FULL);
         let noisy = |share: f64| (least.equations.h - least.equations.p / share).cholesky().is_none();
         assert!(noisy(0.7) && !noisy(MOST));
         let near = least.motion.stepped(&least.tangent, &SMatrix::from([[0.004, -0.002, 0.0, 0.0, 0.0]]));
-        let found = refine(&observations, near, None, Effort { steps: 3, ..Effort::FULL });
+        let found = refine(&observations, near, None, StoppingCriteria { steps: 3, ..StoppingCriteria::FULL });
         assert!(found.motion.angle_to(&least.motion) < 1e-4, "{}", found.motion.angle_to(&least.motion));
     }
 }

@@ -78,7 +78,7 @@ impl DepthSmoother {
     }
 
     /// Points with their depths, by place in the tree.
-    fn sites(&self, depths: &Depths) -> Vec<Site> {
+    fn depth_sites(&self, depths: &Depths) -> Vec<Site> {
         let places = self.tree.order().iter().zip(self.tree.points());
         places.map(|(&i, &at)| Site { at, nu: depths.nu[i as usize], s2: depths.s2[i as usize] }).collect()
     }
@@ -97,7 +97,7 @@ impl DepthSmoother {
         }
         for k in SIZES.into_iter().filter(|&k| k <= self.lists.k && which != Smoother::Prior) {
             let prediction = regress(sites, &self.compared, &self.lists, k, self.spherical, self.level);
-            let excess = excess(&compared, &prediction);
+            let excess = excess_variance(&compared, &prediction);
             let loss = loss(&compared, &prediction, excess, 0.0);
             offer(Fitted { kind: Kind::Nearest(k), prediction, excess, loss });
         }
@@ -134,9 +134,9 @@ impl DepthSmoother {
     }
 
     /// How unlikely the depths are, given their neighbours, in units of `J`: `sum [ln(tot s^2) + min(res^2 /
-    /// tot, 25)]`. Whatever smooths the weights, this looks at the better predictor.
+    /// tot, 25)]`. Always uses the better predictor.
     pub fn cost(&self, depths: &Depths) -> f64 {
-        let sites = self.sites(depths);
+        let sites = self.depth_sites(depths);
         let fitted = self.best(&sites, Smoother::Auto);
         let compared: Vec<Site> = self.compared.iter().map(|&place| sites[place as usize]).collect();
         loss(&compared, &fitted.prediction, fitted.excess, 1.0) * sites.len() as f64
@@ -144,7 +144,7 @@ impl DepthSmoother {
 
     /// The posterior means `nu~ = q + (t2 + c) / tot (nu^ - q)` of all depths; as long as the planes.
     pub fn smooth(&mut self, depths: &Depths) -> Smoothed {
-        let sites = self.sites(depths);
+        let sites = self.depth_sites(depths);
         let Fitted { kind, prediction, excess, .. } = self.best(&sites, self.which);
         let all = match kind {
             Kind::Prior => {
@@ -177,7 +177,7 @@ impl DepthSmoother {
 }
 
 /// The scatter of depths about their predictions beyond both noises, `t2`.
-fn excess(sites: &[Site], prediction: &Prediction) -> f64 {
+fn excess_variance(sites: &[Site], prediction: &Prediction) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
     for (site, (q, c)) in sites.iter().zip(prediction.q.iter().zip(&prediction.c)).filter(|(site, _)| site.s2 > 0.0) {
         let noise = 1.0 / site.s2 + c;

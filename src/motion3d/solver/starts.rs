@@ -1,6 +1,6 @@
 //! The search over directions: where on the half sphere the residuals are small.
 
-use super::refine::{Effort, refine};
+use super::refine::{StoppingCriteria, refine};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::best_rotation;
 use crate::motion3d::model::motion::Motion;
@@ -36,7 +36,7 @@ const APART_FURTHER: f64 = 4.0;
 /// Starts among what a few steps on a few points lead to.
 const BASINS: usize = 4;
 const FEW: usize = 128;
-const STEPS: Effort = Effort { steps: 4, tolerance: 1e-2, deviations: 0.0 };
+const STEPS: StoppingCriteria = StoppingCriteria { steps: 4, tolerance: 1e-2, deviations: 0.0 };
 
 /// Directions that are worked on together. Fixed, so that nothing depends on the number of threads.
 const TOGETHER: usize = 20;

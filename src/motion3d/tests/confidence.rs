@@ -1,4 +1,4 @@
-//! What is not known must not be told as `ok`: valleys, opposite motions, samples of many points.
+//! What is not known must not be reported as `ok`: valleys, opposite motions, samples of many points.
 
 use super::scenes::{Scene, W, mahalanobis, oblique, smooth};
 use crate::motion3d::*;
@@ -65,7 +65,7 @@ fn the_opposite_motion_is_told_where_depths_do_not_exclude_it() {
     }
 }
 
-/// The residuals that tell of other directions are maximum likelihood's, on a sample of the points.
+/// The residuals that show other directions are maximum likelihood's, on a sample of the points.
 #[test]
 fn many_points_are_no_reason_for_doubt() {
     let mut trusted = 0;
@@ -78,7 +78,7 @@ fn many_points_are_no_reason_for_doubt() {
 }
 
 /// With noisy depths the deviation of a thousand points grows faster than by the root of their number: what
-/// they leave in doubt is asked of more.
+/// they leave in doubt is tested on more.
 #[test]
 fn what_a_thousand_of_the_points_leave_in_doubt_is_asked_of_more() {
     let forward = Motion::new([0.05, -0.03, 1.0], W);

@@ -78,7 +78,7 @@ fn it_is_no_smaller_than_that_of_independent_points() {
     assert_eq!(told(Some(0.0), None), alone);
     assert!((told(Some(1e-6), None) - alone).abs() < 1e-9 * alone);
     assert!(told(Some(LENGTH), None) > 1.1 * alone);
-    // Noise that is already told for many that share one error covers it.
+    // Noise already given for many that share one error covers it.
     assert!((told(Some(LENGTH), Some(500.0)) - told(None, Some(500.0))).abs() < 1e-9 * alone);
     let wrong = MotionOptions { correlation_length: Some(-1.0), ..MotionOptions::default() };
     let error = estimate_motion(&given, &Noise::Sigma(SIGMA), &wrong).unwrap_err().to_string();

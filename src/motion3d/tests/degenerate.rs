@@ -111,7 +111,8 @@ fn a_plane_has_two_motions() {
 /// Places by number.
 type Layout<'a> = Box<dyn Fn(u64) -> [f64; 2] + 'a>;
 
-/// Points at one place, at two, on a line through the epipole: fewer than five unknowns are told of, whatever
+/// Points at one place, at two, on a line through the epipole: fewer than five unknowns are determined,
+/// whatever
 /// noise seems to add.
 #[test]
 fn points_that_do_not_tell_of_all_unknowns() {

@@ -53,7 +53,7 @@ fn outliers_are_judged_by_their_own_errors() {
         let kept = found.inliers.iter().filter(|inlier| **inlier).count();
         assert!(kept > 700, "{seed}: {kept}");
     }
-    // Those along their epipolar lines obey.
+    // Those along their epipolar lines are inliers.
     assert!(right > 40 * 160 * 7 / 10 && without < right / 4, "{right} {without}");
     assert!(inside >= 34, "{inside}");
 }

@@ -140,7 +140,7 @@ fn midpoints_make_displacements_exact_to_second_order() {
     assert!(middle < 0.05 * start && middle.to_degrees() < 0.02, "{start} {middle}");
 }
 
-/// In a narrow field only what is known of the rotation tells it from a sideways translation.
+/// In a narrow field only a rotation prior separates it from a lateral translation.
 #[test]
 fn a_known_rotation_is_heeded() {
     let motion = oblique();
@@ -180,7 +180,7 @@ fn weights_may_have_their_depths_from_elsewhere() {
     assert!(error.starts_with("weight_inv_depth: "), "{error}");
 }
 
-/// Whatever is given for the weights, the covariance is that of what comes out.
+/// For any given weights, the covariance is that of the result.
 #[test]
 fn weights_of_any_unit_and_quality_leave_the_covariance_honest() {
     let noise = CounterRng::new(55);

@@ -261,7 +261,7 @@ fn exact_patches_give_the_exact_motion() {
     }
 }
 
-/// Whatever the flow is, as displacements in pixels of points on the plane at distance 1 are: rotations that
+/// For any flow, as displacements in pixels of points on the plane at distance 1 are: rotations that
 /// lead all points behind the camera are no reason to stop.
 #[test]
 fn flow_that_no_rotation_can_be_taken_out_of_is_no_reason_to_stop() {

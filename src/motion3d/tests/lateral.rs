@@ -22,7 +22,7 @@ fn between(a: f64, b: f64) -> f64 {
 }
 
 /// Mean squared errors over many trials: of maximum likelihood, of weights of 1, of shrunk weights; and the
-/// mean variances told.
+/// mean variances reported.
 fn squares(n: usize, sigma: f64, told: Option<f64>, trials: u64) -> ([f64; 3], [f64; 3]) {
     let (nu, angle) = (depths(n), 2.2);
     let (mut errors, mut variances) = ([0.0; 3], [0.0; 3]);
@@ -132,7 +132,7 @@ fn noise_alone_is_told_by_its_variance() {
     for seed in 0..200 {
         let noise = flow(&[0.0; 100], 0.0, 1.0, seed);
         for weights in ALL {
-            // A uniform angle has the deviation pi / sqrt(3); half a radian would be something known.
+            // A uniform angle has the deviation pi / sqrt(3); half a radian would be information.
             sure += u32::from(estimate_lateral(&noise, Some(1.0), weights).unwrap().variance < 0.05);
         }
     }

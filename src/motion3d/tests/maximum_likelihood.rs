@@ -1,10 +1,11 @@
-//! Maximum likelihood asked for by name: as doubtful as the smoothed weights, and honest about what it lacks.
+//! Maximum likelihood requested by name: as doubtful as the smoothed weights, and honest about what it lacks.
 
 use super::scenes::{Held, Scene, W, ground, oblique, smooth};
 use crate::math::random::CounterRng;
 use crate::motion3d::*;
 
-/// Two minima of one scene are as hard to tell for maximum likelihood as they are for the smoothed weights.
+/// Two minima of one scene are as hard to separate for maximum likelihood as they are for the smoothed
+/// weights.
 #[test]
 fn maximum_likelihood_tells_of_other_minima_too() {
     let (mut undecided, mut sure) = (0, 0);
@@ -23,7 +24,7 @@ fn maximum_likelihood_tells_of_other_minima_too() {
 }
 
 /// By name, maximum likelihood's own theory holds while the noise of the depths matters little; where the
-/// epipole may lie among noisy points it is told how far it is from the better solution.
+/// epipole may lie among noisy points its distance from the better solution is reported.
 #[test]
 fn maximum_likelihood_tells_how_far_it_may_be() {
     let ground = |_: f64, y: f64, _: f64| ground(y);

@@ -1,4 +1,4 @@
-//! Scenes in which something moves by itself.
+//! Scenes with an object that moves by itself.
 
 use super::scenes::{Held, Scene, mahalanobis, smooth};
 use crate::math::random::CounterRng;
@@ -8,7 +8,7 @@ fn options() -> MotionOptions {
     MotionOptions { robust: true, placement: Placement::Start, ..MotionOptions::default() }
 }
 
-/// Something large that overtakes moves along the camera's epipolar lines: together with the rest of the
+/// A large object that overtakes moves along the camera's epipolar lines: together with the rest of the
 /// scene it can look like a sideways motion.
 #[test]
 fn a_robust_search_tells_what_else_many_points_obey() {
@@ -27,7 +27,7 @@ fn a_robust_search_tells_what_else_many_points_obey() {
             let nearest = both.map(|motion| motion.angle_to(&truth).to_degrees()).fold(f64::INFINITY, f64::min);
             assert!(nearest < 3.0, "{seed}: {nearest}");
         }
-        // A thing of a quarter of the points that overtakes leaves no doubt.
+        // An object of a quarter of the points that overtakes leaves no doubt.
         let overtaking = Motion::new([0.0, 0.0, 1.0], [0.0; 3]);
         let mut scene = Scene::new(ahead, 600, 0.6, 0.01, seed, |_, _, r| 0.5 + r);
         let truck = Scene::new(overtaking, 600, 0.6, 0.01, seed, |_, _, r| 0.5 + r);
@@ -39,7 +39,8 @@ fn a_robust_search_tells_what_else_many_points_obey() {
     }
 }
 
-/// Points of a mover that obey the scene's motion by chance lie together and pull the same way: with a slow
+/// Points of a moving object that fit the scene's motion by chance lie together and pull the same way: with a
+/// slow
 /// mover that is not seen in their residuals.
 #[test]
 fn a_slow_mover_is_found_or_told() {
@@ -66,7 +67,7 @@ fn a_slow_mover_is_found_or_told() {
     assert!(silent <= 2 && trusted >= 11, "{silent} {trusted}");
 }
 
-/// A fifth of the points moves by itself: some of them obey the camera's motion by chance, and pull it their
+/// A fifth of the points moves by itself: some of them fit the camera's motion by chance, and pull it their
 /// way. They lie among rejected ones.
 #[test]
 fn points_among_rejected_ones_do_not_pull_the_motion() {
@@ -90,12 +91,12 @@ fn points_among_rejected_ones_do_not_pull_the_motion() {
         }
     }
     let wrong = wrong as f64 / (1000.0 * f64::from(held.of));
-    // So slow a mover is hard to tell: with those points a quarter of the ellipsoids would not hold.
+    // So slow an object is hard to detect: with those points a quarter of the ellipsoids would not hold.
     assert!(held.of >= 150 && held.honest() && wrong < 0.025, "{held:?}, {wrong}");
 }
 
 /// A disc of 30 % of the points moves by itself, in noise of a tenth of the flow: with the rest of the scene
-/// it may obey a third motion, at which every search ends. The residuals there are hardly larger than noise,
+/// it may fit a third motion, at which every search ends. The residuals there are little larger than noise,
 /// but those of a part pull another way, and two motions explain the points better.
 #[test]
 fn what_a_thing_and_the_scene_obey_together_is_not_trusted() {

@@ -19,7 +19,7 @@ fn held(motion: Motion, (h, n, sigma): (f64, usize, f64), depth: Depth<'_>, tria
     held
 }
 
-/// Of each layout by itself: at an estimate that is off, the information tells of much smaller errors.
+/// Of each layout by itself: at an estimate that is off, the information promises much smaller errors.
 #[test]
 fn ellipsoids_hold_the_truth_in_narrow_fields() {
     let [sideways, across, down, straight] =
@@ -106,7 +106,7 @@ fn minima_under_noise_that_is_far_from_round_are_found() {
     assert!(held.of >= 65 && held.share() >= 0.87, "{held:?}");
 }
 
-/// Noise that is three times what was told makes errors three times as large, and the covariance nine times.
+/// Noise that is three times the given one makes errors three times as large, and the covariance nine times.
 #[test]
 fn residuals_that_the_told_noise_does_not_explain_widen_the_covariance() {
     let (mut held, mut factor) = (Held::default(), 0.0);

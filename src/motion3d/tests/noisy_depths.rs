@@ -1,4 +1,4 @@
-//! Depths that are mostly noise hide the truth behind a lower minimum: that must not be told as `ok`.
+//! Depths that are mostly noise hide the truth behind a lower minimum: that must not be reported as `ok`.
 
 use super::scenes::{Scene, ground, oblique, smooth};
 use crate::motion3d::*;
@@ -27,7 +27,7 @@ fn a_ground_in_large_noise_is_not_told_wrong_as_ok() {
     }
 }
 
-/// Of hardly visible depths half are behind the camera by noise alone, and a wrong motion may have fewer of
+/// Of depths near 0 half are behind the camera by noise alone, and a wrong motion may have fewer of
 /// them.
 #[test]
 fn a_ground_ahead_in_noise_as_large_as_its_flow_is_not_told_wrong_as_ok() {

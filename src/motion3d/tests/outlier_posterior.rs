@@ -1,4 +1,4 @@
-//! Outliers that obey by chance, and inliers whose depths look like theirs.
+//! Outliers that fit by chance, and inliers whose depths look like theirs.
 
 use super::scenes::{Scene, mahalanobis};
 use crate::math::random::CounterRng;
@@ -26,7 +26,7 @@ fn among_outliers(outliers: f64, noise: f64, seed: u64) -> Scene {
     scene
 }
 
-/// Strays that obey tell nothing of the motion, however large the depths they seem to have.
+/// Outliers that fit by chance carry no information, however large their apparent depths.
 #[test]
 fn strays_that_obey_are_in_the_covariance() {
     let options = MotionOptions { placement: Placement::Start, robust: true, ..MotionOptions::default() };
@@ -44,8 +44,8 @@ fn strays_that_obey_are_in_the_covariance() {
     }
 }
 
-/// Few near things before a far background carry all of the translation: a depth that is odd is no stray
-/// where no strays are.
+/// Few near objects before a far background carry all of the translation: an odd depth is no outlier
+/// where no outliers are.
 #[test]
 fn few_near_points_before_a_far_background_stay() {
     let motion = Motion::new([0.6, 0.2, 0.75], [0.01, -0.015, 0.005]);

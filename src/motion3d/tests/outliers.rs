@@ -1,4 +1,4 @@
-//! Few points with outliers: what a doubtful choice of them leaves must be told.
+//! Few points with outliers: what a doubtful choice of them leaves must be reported.
 
 use super::scenes::{Scene, mahalanobis};
 use crate::math::random::CounterRng;
@@ -17,7 +17,7 @@ fn with_outliers(n: usize, outliers: usize, sigma: f64, reach: f64, seed: u64) -
     scene
 }
 
-/// Whatever few points are said to be, nothing is said to be sure.
+/// Of so few points no status is `ok`.
 #[test]
 fn a_handful_of_points_is_no_reason_to_stop() {
     for n in 0..16 {
@@ -57,7 +57,7 @@ fn few_points_do_not_choose_their_own_noise() {
     assert!(right >= 18, "{right} of 20");
 }
 
-/// Among few points, outliers that obey by chance can be those that decide: a known noise does not tell them.
+/// Among few points, outliers that fit by chance can decide: a known noise does not show them.
 #[test]
 fn few_points_with_outliers_are_told_in_known_noise_too() {
     let (mut confident, mut wrong) = (0, 0);

@@ -1,4 +1,4 @@
-//! Six numbers a patch: what is not known must not be told as `ok`.
+//! Six numbers a patch: what is not known must not be reported as `ok`.
 
 use super::scenes::mahalanobis;
 use crate::math::random::CounterRng;

@@ -74,7 +74,7 @@ fn one_unknown_has_its_closed_forms() {
     let at = vec![[0.0; 2]; 101];
     let flow = Flow::Plane { points: &at, flow: &at, camera: None };
     let observations =
-        crate::motion3d::model::whitening::Intake::new(&flow, &Noise::Sigma(0.3), Placement::Start).whitened();
+        crate::motion3d::model::whitening::Whitening::new(&flow, &Noise::Sigma(0.3), Placement::Start).whitened();
     let motion = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
     let tangent = crate::motion3d::model::rows::tangents(&motion.u());
     let mut nu = depths.clone();

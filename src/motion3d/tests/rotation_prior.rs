@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 /// Deviation of the known rotation, about that of the flow's own.
 const DEVIATION: f64 = 0.003;
 
-/// A scene, and its rotation as it is known: by chance, and besides that `off` deviations beside.
+/// A scene, and its rotation as it is known: by chance, and in addition `off` deviations beside.
 fn told(seed: u64, off: f64) -> (Scene, RotationPrior) {
     let scene = Scene::new(oblique(), 300, 0.6, 0.01, seed, |x, y, _| smooth(x, y));
     let rng = CounterRng::new(seed).stream(9);
@@ -42,7 +42,7 @@ fn flow_that_speaks_against_a_known_rotation_is_heard() {
             let found = run(&scene, Some(prior));
             assert_eq!(found.status, Status::Ambiguous, "{method:?} {robust} {known} {seed}");
             wide.count(&found, &scene.motion);
-            // What the flow tells by itself is an alternative.
+            // The motion of the flow alone is an alternative.
             let alone = found
                 .alternatives
                 .iter()
@@ -66,7 +66,7 @@ fn a_wrong_rotation_hides_no_translation_in_unknown_noise() {
     }
 }
 
-/// The more surely a wrong rotation is told, the larger residuals it leaves: they are no reason to hear the
+/// The more precise a wrong rotation is, the larger residuals it leaves: they are no reason to hear the
 /// flow less.
 #[test]
 fn a_wrong_rotation_that_is_told_surely_does_not_hide_itself() {

@@ -3,7 +3,7 @@
 use crate::math::random::CounterRng;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
-use crate::motion3d::model::whitening::Intake;
+use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::{Flow, Motion, MotionEstimate, MotionOptions, Noise, Placement, estimate_motion};
 use nalgebra::Vector3;
 
@@ -70,7 +70,7 @@ impl Scene {
     }
 
     pub fn observations(&self) -> Observations {
-        Intake::new(&self.flow(), &Noise::Sigma(self.sigma), Placement::Start).whitened()
+        Whitening::new(&self.flow(), &Noise::Sigma(self.sigma), Placement::Start).whitened()
     }
 }
 
@@ -105,7 +105,7 @@ impl Held {
         f64::from(self.inside) / f64::from(self.of)
     }
 
-    /// Whether the share is what is asked of covariances: .88 to .97.
+    /// Whether the share is what covariances must hold: .88 to .97.
     pub fn honest(self) -> bool {
         (0.88..=0.97).contains(&self.share())
     }

@@ -23,7 +23,7 @@ fn depths_that_are_mostly_noise_are_low_snr() {
             Status::IllConditioned | Status::Ambiguous => other += 1,
             status => panic!("{seed}: {status:?}"),
         }
-        // What is told instead, that of the smoothed weights, holds all the same.
+        // What is reported instead, that of the smoothed weights, holds all the same.
         assert!(found.direction_std > 2.0 && found.motion.angle_to(&forward).to_degrees() < 4.0 * found.direction_std);
         low += u32::from(found.status == Status::LowSnr);
     }
@@ -43,7 +43,7 @@ fn a_field_of_two_degrees_is_ill_conditioned() {
     assert!(ill >= 26, "{ill} of 30");
 }
 
-/// At one place there are two numbers for five unknowns, whatever is told of the noise.
+/// At one place there are two numbers for five unknowns, with any given noise.
 #[test]
 fn one_place_is_ill_conditioned_without_a_covariance() {
     let points = [[0.2, -0.1]; 60];

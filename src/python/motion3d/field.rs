@@ -3,7 +3,7 @@
 use super::flow::{motion, spread};
 use super::given::{fixed, square, word};
 use super::options::PLACEMENTS;
-use super::told::matrix;
+use super::results::matrix;
 use crate::motion3d::{
     CommonEffect, FieldOptions, Intrinsics, UncertainMotion, contact_map, field_patches, field_points,
 };
@@ -74,10 +74,10 @@ fn single(field: &FlowField) -> PyResult<()> {
     if field.count().1 { Err(PyValueError::new_err(message)) } else { Ok(()) }
 }
 
-/// A motion as its result tells it.
+/// A motion with its covariance, as in its result.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
-pub struct Told<'py> {
+pub struct PyUncertainMotion<'py> {
     translation: Array<'py>,
     rotation: Array<'py>,
     tangent: Array<'py>,
@@ -87,7 +87,7 @@ pub struct Told<'py> {
     moves: Array<'py>,
 }
 
-impl Told<'_> {
+impl PyUncertainMotion<'_> {
     /// As the core takes it.
     fn core(&self) -> PyResult<UncertainMotion> {
         let (tangent, covariance) = spread(&self.tangent, &self.covariance)?;
@@ -103,12 +103,12 @@ pub fn motion3d_contact_map<'py>(
     py: Python<'py>,
     field: &FlowField,
     intrinsics: &Array<'py>,
-    told: Told<'py>,
+    known: PyUncertainMotion<'py>,
     placement: &str,
 ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>)> {
     single(field)?;
     let camera = Intrinsics::new(square("K", "", intrinsics)?)?;
-    let known = told.core()?;
+    let known = known.core()?;
     let placement = word("placement", placement, &PLACEMENTS)?;
     let found = each!(field.store(), packed => {
         let field = field.core(packed, 0);

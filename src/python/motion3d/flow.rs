@@ -1,7 +1,7 @@
 //! What a motion does to points, and where it leads.
 
 use super::given::{camera, fixed, rows, triple};
-use super::told::{matrix, vector};
+use super::results::{matrix, vector};
 use crate::error::Error;
 use crate::motion3d::{Motion, RotationPrior, focus_of_expansion};
 use crate::python::arrays;
@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 /// An array, in or out.
 type Any<'py> = Bound<'py, PyAny>;
 
-/// The axes of a direction and the covariance that is told in them.
+/// The axes of a direction and its covariance in them.
 pub fn spread(tangent: &Any<'_>, covariance: &Any<'_>) -> PyResult<([[f64; 3]; 2], [[f64; 5]; 5])> {
     Ok((fixed("tangent", tangent)?, fixed("covariance", covariance)?))
 }
@@ -43,7 +43,7 @@ pub fn motion3d_essential<'py>(py: Python<'py>, translation: &Any<'py>, rotation
     Ok(matrix(py, &motion.essential_matrix())?.into_any())
 }
 
-/// The rotation of a thing in a scene as far as the scene's tells it, and its covariance; `None` where the
+/// The rotation prior of an object in a scene, and its covariance; `None` where the
 /// scene's is not known.
 #[pyfunction]
 #[pyo3(name = "_motion3d_beside")]

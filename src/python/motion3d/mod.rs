@@ -5,7 +5,7 @@ mod flow;
 mod given;
 mod lateral;
 mod options;
-mod told;
+mod results;
 
 pub use field::{motion3d_contact_map, motion3d_field_patches, motion3d_field_points};
 pub use flow::{motion3d_beside, motion3d_essential, motion3d_focus, motion3d_predict};
@@ -15,7 +15,7 @@ use crate::motion3d::{Motion, check_motion, estimate_motion, estimate_patch_moti
 use given::{Given, GivenPatches, Layout, rows, triple};
 use options::Options;
 use pyo3::prelude::*;
-use told::{ToldBound, ToldEstimate};
+use results::{ToldBound, ToldEstimate};
 
 #[pyfunction]
 #[pyo3(name = "_motion3d_estimate")]

@@ -1,4 +1,4 @@
-//! What residuals tell of errors: how large they are and how far they go together.
+//! Estimates from residuals how large errors are and how far they correlate.
 //!
 //! A field's correlation length is that of its windows. What a scene does to flow (edges in depth, a texture
 //! that smoothing reaches across) goes together farther, and differs from field to field.
@@ -15,26 +15,26 @@ use rayon::prelude::*;
 /// points.
 const NEAR: f64 = 6.0;
 
-/// Fewer points than this do not tell how far errors go together: by chance their residuals correlate as
+/// Fewer points than this do not determine how far errors correlate: by chance their residuals correlate as
 /// much.
 const FEWEST: usize = 30;
 
-/// By how much the correlation length may be longer than told, and the steps in which that is looked for.
+/// By how much the correlation length may be longer than given, and the steps in which that is looked for.
 const LONGEST: f64 = 4.0;
 const STEP: f64 = 1.15;
 
 /// Points that sums over pairs are made from; of more, every so manieth stands for its neighbours.
 const ENOUGH: usize = 2000;
 
-/// The least share of the errors' variance that is left in residuals, for it to be told by them.
+/// The least share of the errors' variance that is left in residuals, for them to determine it.
 const LEFT: f64 = 0.1;
 
 /// What is known of the errors of the points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Errors {
-    /// By how much the correlation length is longer than told.
+    /// By how much the correlation length is longer than given.
     pub stretch: f64,
-    /// Their variance in units of the noise that is told, not below that of a point's own.
+    /// Their variance in units of the given noise, not below that of a point's own.
     pub variance: f64,
 }
 
@@ -52,7 +52,7 @@ impl Errors {
         let mut expected = points.expected(&near, inverse, stretch);
         while points.all.len() >= FEWEST && expected.alike < alike && stretch * STEP <= LONGEST {
             let next = points.expected(&near, inverse, stretch * STEP);
-            // Longer ones look like a motion, and are told by no residual.
+            // Longer ones look like a motion, and show in no residual.
             if next.alike <= expected.alike {
                 break;
             }

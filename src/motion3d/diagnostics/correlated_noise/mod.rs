@@ -3,8 +3,8 @@
 //! Sums over points that are taken for independent make the covariance too small where neighbours err alike.
 //! With the correlation `rho(d)` of two errors at the distance `d`, the equations `sum W^t e` have the
 //! covariance `sum_kl rho(d_kl) W_k^t W_l` instead of `sum W^t W`: neighbours count by how much their rows
-//! agree, so that points which decide alone are hardly touched. How far errors go together beyond the length
-//! that is told, and how large they are, the residuals tell ([`Errors`]).
+//! agree, so that points which decide alone change little. How far errors correlate beyond the given length,
+//! and how large they are, is estimated from the residuals ([`Errors`]).
 
 mod errors;
 
@@ -50,7 +50,7 @@ pub(crate) struct Weighted<'a> {
 ///
 /// From `covariance = X B X` with `B = sum W^t W` follows the `X` that the equations' errors are multiplied
 /// with: the geometric mean of the covariance and `B^-1`.
-pub(crate) fn together(
+pub(crate) fn correlated_covariance(
     covariance: &Matrix5,
     inliers: &Observations,
     at: &Weighted<'_>,
@@ -62,7 +62,7 @@ pub(crate) fn together(
     let errors = Errors::told_by_residuals(&points, &inverse(&squares)?, inliers.own());
     let l = squares.cholesky()?.l();
     let back = l.try_inverse()?;
-    let larger = Matrix5::identity() + positive(&(back * excess(&points, &errors) * back.transpose()));
+    let larger = Matrix5::identity() + positive(&(back * correlation_excess(&points, &errors) * back.transpose()));
     let told = l.transpose() * covariance * l;
     let told = SymmetricEigen::new(0.5 * (told + told.transpose()));
     let root = told.eigenvalues.map(|size| size.max(0.0).sqrt());
@@ -73,7 +73,7 @@ pub(crate) fn together(
 }
 
 /// The same of a rotation alone, whose residuals are flow of two components.
-pub(crate) fn turning(
+pub(crate) fn correlated_rotation_covariance(
     covariance: &Matrix3<f64>,
     inliers: &Observations,
     w: &Vector3<f64>,
@@ -84,22 +84,23 @@ pub(crate) fn turning(
     inverse.fixed_view_mut::<3, 3>(2, 2).copy_from(covariance);
     let of_axis = |axis: usize| {
         let points = Neighbourhood::of_rotation(inliers, w, axis, flow, length);
-        excess(&points, &Errors::told_by_residuals(&points, &inverse, inliers.own()))
+        correlation_excess(&points, &Errors::told_by_residuals(&points, &inverse, inliers.own()))
     };
     inverse += inverse * positive(&(of_axis(0) + of_axis(1))) * inverse;
     inverse.fixed_view::<3, 3>(2, 2).into_owned()
 }
 
-/// The part of a symmetric matrix above 0: below, the points would tell more than independent ones.
+/// The part of a symmetric matrix above 0: below, the points would have more information than independent
+/// ones.
 fn positive(matrix: &Matrix5) -> Matrix5 {
     let eigen = SymmetricEigen::new(0.5 * (matrix + matrix.transpose()));
     let sizes = eigen.eigenvalues.map(|size| size.max(0.0));
     eigen.eigenvectors * Matrix5::from_diagonal(&sizes) * eigen.eigenvectors.transpose()
 }
 
-/// What correlation adds to `sum W^t W`: the products of different points, less what the noise that is told
+/// What correlation adds to `sum W^t W`: the products of different points, less what the given noise
 /// has too much for each point's own where several share one error.
-fn excess(points: &Neighbourhood, errors: &Errors) -> Matrix5 {
+fn correlation_excess(points: &Neighbourhood, errors: &Errors) -> Matrix5 {
     points.different(errors.stretch) * errors.variance + points.squares() * (errors.variance - 1.0)
 }
 
