@@ -2,13 +2,14 @@
 //! with the standard deviation that the covariance of the motion gives it to first order, `sd^2 = grad^T
 //! Cov(m) grad`.
 
-mod gradient;
 mod quantity;
 mod region;
 mod region_motion;
 mod sharing;
+mod value;
 
-pub use quantity::{Quantity, value_and_std};
+pub use quantity::Quantity;
 pub use region::{Aggregate, Mean, parameter_mean, plane, planes, region_mean};
 pub use region_motion::{RegionMotion, fit_region};
 pub use sharing::sharing;
+pub use value::value_and_std;

@@ -1,0 +1,205 @@
+//! Values of derived quantities, with their standard deviations by propagation.
+
+use super::Quantity;
+
+/// Value of `quantity` for the motion `m = (u, v, u_x, v_x, u_y, v_y)` at the point `at = (x, y)`, with its
+/// standard deviation where the covariance of m is given.
+///
+/// Per second where `frame_period` (seconds) is given, else per frame; positions and speed in the unit of `m`
+/// and `at` (px, or units of the pitch). [`Quantity::Rpm`] without a frame period is NaN. Quantities that do
+/// not exist for this motion (the centre of a motion without one, the shear axis of no shear) are NaN or
+/// infinite. The standard deviation is first-order: `sqrt(grad^T Cov(m) grad)`.
+pub fn value_and_std(
+    quantity: Quantity,
+    m: [f64; 6],
+    covariance: Option<[[f64; 6]; 6]>,
+    at: (f64, f64),
+    frame_period: Option<f64>,
+) -> (f64, Option<f64>) {
+    let (value, gradient) = value_and_gradient(quantity, &m, at);
+    let per_second = frame_period.map_or(1.0, |dt| dt.powi(-quantity.rate()));
+    let scale = match quantity {
+        // rad/frame -> revolutions per minute.
+        Quantity::Rpm => frame_period.map_or(f64::NAN, |dt| 60.0 / (std::f64::consts::TAU * dt)),
+        _ => per_second,
+    };
+    let sd = covariance.map(|c| {
+        let variance: f64 = (0..6).map(|i| gradient[i] * (0..6).map(|j| c[i][j] * gradient[j]).sum::<f64>()).sum();
+        // Rounding may leave a variance of zero slightly negative.
+        (if variance < 0.0 { 0.0 } else { variance }).sqrt() * scale.abs()
+    });
+    (value * scale, sd)
+}
+
+/// Value per frame and its derivative with respect to `m`.
+fn value_and_gradient(quantity: Quantity, m: &[f64; 6], at: (f64, f64)) -> (f64, [f64; 6]) {
+    let [u, v, ux, vx, uy, vy] = *m;
+    match quantity {
+        Quantity::Divergence => (ux + vy, [0.0, 0.0, 1.0, 0.0, 0.0, 1.0]),
+        Quantity::Curl => (vx - uy, [0.0, 0.0, 0.0, 1.0, -1.0, 0.0]),
+        Quantity::AngularVelocity | Quantity::Rpm => (0.5 * (vx - uy), [0.0, 0.0, 0.0, 0.5, -0.5, 0.0]),
+        Quantity::StrainXx => (ux, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+        Quantity::StrainXy => (0.5 * (uy + vx), [0.0, 0.0, 0.0, 0.5, 0.5, 0.0]),
+        Quantity::StrainYy => (vy, [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]),
+        Quantity::ShearMagnitude => {
+            let (normal, shear) = (ux - vy, uy + vx);
+            let size = normal.hypot(shear);
+            let (c, s) = (normal / size, shear / size);
+            (size, [0.0, 0.0, c, s, s, -c])
+        }
+        Quantity::ShearAxis => {
+            let (normal, shear) = (ux - vy, uy + vx);
+            let square = normal * normal + shear * shear;
+            let (c, s) = (0.5 * normal / square, 0.5 * shear / square);
+            let angle = if square > 0.0 { 0.5 * shear.atan2(normal) } else { f64::NAN };
+            (angle, [0.0, 0.0, -s, c, c, s])
+        }
+        Quantity::RotationCentreX => {
+            let (offset, rows) = centre_offset(m);
+            (at.0 - offset[0], rows[0].map(|d| -d))
+        }
+        Quantity::RotationCentreY => {
+            let (offset, rows) = centre_offset(m);
+            (at.1 - offset[1], rows[1].map(|d| -d))
+        }
+        Quantity::CentreDistance => {
+            let (offset, rows) = centre_offset(m);
+            let distance = offset[0].hypot(offset[1]);
+            let (c, s) = (offset[0] / distance, offset[1] / distance);
+            (distance, std::array::from_fn(|k| c * rows[0][k] + s * rows[1][k]))
+        }
+        Quantity::TimeToContact => {
+            let divergence = ux + vy;
+            let slope = -2.0 / (divergence * divergence);
+            (2.0 / divergence, [0.0, 0.0, slope, 0.0, 0.0, slope])
+        }
+        Quantity::Speed => {
+            let speed = u.hypot(v);
+            (speed, [u / speed, v / speed, 0.0, 0.0, 0.0, 0.0])
+        }
+    }
+}
+
+/// `d = M^-1 (u, v)` and the rows of its derivative: from `M d = (u, v)`, `M dd = d(u, v) - dM d`.
+fn centre_offset(m: &[f64; 6]) -> ([f64; 2], [[f64; 6]; 2]) {
+    let [u, v, ux, vx, uy, vy] = *m;
+    let det = ux * vy - uy * vx;
+    let inverse = [[vy / det, -uy / det], [-vx / det, ux / det]];
+    let apply = |r: usize, a: f64, b: f64| inverse[r][0] * a + inverse[r][1] * b;
+    let d = [apply(0, u, v), apply(1, u, v)];
+    let row = |r: usize| {
+        [
+            inverse[r][0],
+            inverse[r][1],
+            -inverse[r][0] * d[0],
+            -inverse[r][1] * d[0],
+            -inverse[r][0] * d[1],
+            -inverse[r][1] * d[1],
+        ]
+    };
+    (d, [row(0), row(1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::{FRAC_PI_4, PI};
+
+    fn value(q: Quantity, m: [f64; 6]) -> f64 {
+        value_and_std(q, m, None, (10.0, 20.0), None).0
+    }
+
+    #[test]
+    fn textbook_motions_have_their_values() {
+        // Rotation by 0.1 rad/frame about (13, 16): (u, v) = w (-(y - cy), x - cx).
+        let w = 0.1;
+        let rotation = [-w * 4.0, w * -3.0, 0.0, w, -w, 0.0];
+        for (q, want) in [
+            (Quantity::Divergence, 0.0),
+            (Quantity::Curl, 0.2),
+            (Quantity::AngularVelocity, 0.1),
+            (Quantity::ShearMagnitude, 0.0),
+            (Quantity::RotationCentreX, 13.0),
+            (Quantity::RotationCentreY, 16.0),
+            (Quantity::CentreDistance, 5.0),
+            (Quantity::Speed, 0.5),
+        ] {
+            assert!((value(q, rotation) - want).abs() < 1e-12, "{q:?} {}", value(q, rotation));
+        }
+        let approach = [1.0, -2.0, 0.05, 0.0, 0.0, 0.05];
+        assert!((value(Quantity::TimeToContact, approach) - 20.0).abs() < 1e-12);
+        let diagonal = [0.0, 0.0, 0.0, 0.1, 0.1, 0.0];
+        assert!((value(Quantity::ShearAxis, diagonal) - FRAC_PI_4).abs() < 1e-12);
+        assert!((value(Quantity::ShearMagnitude, diagonal) - 0.2).abs() < 1e-12);
+        assert!((value(Quantity::StrainXy, diagonal) - 0.1).abs() < 1e-12);
+        let stretch = [0.0, 0.0, 0.1, 0.0, 0.0, 0.0];
+        assert_eq!((value(Quantity::ShearAxis, stretch), value(Quantity::StrainXx, stretch)), (0.0, 0.1));
+    }
+
+    #[test]
+    fn the_frame_period_turns_frames_into_seconds() {
+        let m = [3.0, 4.0, 0.0, PI / 50.0, -PI / 50.0, 0.02];
+        let with = |q| value_and_std(q, m, None, (0.0, 0.0), Some(0.02)).0;
+        assert!((with(Quantity::Rpm) - 30.0).abs() < 1e-9);
+        assert!((with(Quantity::AngularVelocity) - PI).abs() < 1e-9);
+        assert!((with(Quantity::TimeToContact) - 2.0).abs() < 1e-9);
+        assert!((with(Quantity::Speed) - 250.0).abs() < 1e-9);
+        assert!(value(Quantity::Rpm, m).is_nan());
+        assert_eq!(Quantity::TimeToContact.unit(true), "s");
+    }
+
+    #[test]
+    fn standard_deviations_agree_with_simulation() {
+        let rng = crate::math::random::CounterRng::new(4);
+        let m = [1.0, -0.7, 0.05, 0.04, -0.06, 0.03];
+        let sd = [0.02, 0.03, 0.0005, 0.0007, 0.0006, 0.0004];
+        // Correlated: each parameter shares a common factor.
+        let mut covariance = [[0.0; 6]; 6];
+        for i in 0..6 {
+            for j in 0..6 {
+                covariance[i][j] = sd[i] * sd[j] * if i == j { 1.0 } else { 0.5 };
+            }
+        }
+        for q in Quantity::ALL {
+            let want = value_and_std(q, m, Some(covariance), (5.0, 6.0), Some(0.5)).1.unwrap();
+            let n = 20_000u64;
+            let values: Vec<f64> = (0..n)
+                .map(|k| {
+                    let common = rng.normal(10 * k);
+                    let draw: [f64; 6] = std::array::from_fn(|i| {
+                        m[i] + sd[i] * (0.5f64.sqrt() * common + 0.5f64.sqrt() * rng.normal(10 * k + 1 + i as u64))
+                    });
+                    value_and_std(q, draw, None, (5.0, 6.0), Some(0.5)).0
+                })
+                .collect();
+            let mean = values.iter().sum::<f64>() / n as f64;
+            let got = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
+            assert!((got / want - 1.0).abs() < 0.04, "{q:?}: simulated {got}, propagated {want}");
+        }
+    }
+
+    #[test]
+    fn gradients_agree_with_central_differences() {
+        let motions = [
+            [1.0, -0.7, 0.05, 0.04, -0.06, 0.03],
+            [-0.2, 0.9, -0.01, 0.2, -0.15, 0.07],
+            [3.0, 0.1, 0.3, -0.2, -0.1, -0.4],
+        ];
+        for m in motions {
+            for q in Quantity::ALL {
+                let (_, gradient) = value_and_gradient(q, &m, (3.0, 4.0));
+                for k in 0..6 {
+                    let h = 1e-6;
+                    let at = |s: f64| {
+                        let mut moved = m;
+                        moved[k] += s;
+                        value_and_gradient(q, &moved, (3.0, 4.0)).0
+                    };
+                    let got = (at(h) - at(-h)) / (2.0 * h);
+                    let scale = gradient.iter().fold(1.0, |a: f64, g| a.max(g.abs()));
+                    assert!((got - gradient[k]).abs() < 1e-6 * scale, "{q:?} {k}: {got} {}", gradient[k]);
+                }
+            }
+        }
+    }
+}
