@@ -39,7 +39,7 @@ def motion_bound(
     jacobian: bool = False,
     projection: Literal["plane", "sphere"] = "plane",
 ) -> MotionBound:
-    """What flow at these points could tell about a motion: for the design of an experiment, before anything is measured.
+    """Predicted covariances of a motion from flow at these points: for the design of an experiment, before anything is measured.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def motion_bound(
     Raises
     ------
     ValueError
-        For shapes and values that do not fit, noise that is not told or told twice, and fewer than 5 points (2 with `jacobian`) that are finite.
+        For shapes and values that do not fit, noise that is not given or given twice, and fewer than 5 points (2 with `jacobian`) that are finite.
     NotObservableError
         When the points do not determine the motion, as points at one place.
     """

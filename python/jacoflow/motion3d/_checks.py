@@ -35,7 +35,7 @@ def pair(name: str, given: tuple[ArrayLike, ArrayLike] | None) -> tuple[ArrayLik
 
 
 def number(name: str, value: float) -> float:
-    """A real number that is none of the things that Python turns into one."""
+    """A real number not a value that Python would convert to one."""
     if not isinstance(value, str | bytes | bool | np.bool_ | complex):
         try:
             return float(value)
@@ -66,7 +66,7 @@ def count(name: str, value: int) -> int:
 
 
 def switch(name: str, value: bool) -> bool:
-    """True or False, and none of the things that only have a truth: any text is true."""
+    """True or False, not a value with a truth: any text is true."""
     if not isinstance(value, bool | np.bool_):
         raise TypeError(f"{name}: expected True or False, got {value!r}")
     return bool(value)

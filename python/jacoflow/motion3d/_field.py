@@ -13,7 +13,7 @@ from ._estimate import estimate_motion
 from ._results import CommonEffect, MotionEstimate
 
 OPTIONS = frozenset(estimate_motion.__kwdefaults__ or ())
-"""What may be said of the estimate; what a field tells itself is refused by name."""
+"""Options of the estimate that come from the field are refused by name."""
 
 FIELD_OWN = {
     "sigma": "has covariances of its own",
@@ -48,7 +48,7 @@ def estimate_field_motion(
     max_points : int or None
         Most points, of the `region` if there is one; the grid is made coarser to keep to it.
     region : (x, y, width, height), px, or None
-        Only points in this rectangle: those of one thing, whose motion relative to the camera is then found.
+        Only points in this rectangle: those of one object, whose motion relative to the camera is then found.
     scene : MotionEstimate or None
         The motion of the whole scene. Its rotation, which is the camera's, is then what is known beforehand of the thing's in `region`: in a narrow field a rotation looks like a sideways motion, and with a slanted surface that trades against the approach.
     object_rotation_std : float, rad/frame
@@ -57,7 +57,7 @@ def estimate_field_motion(
         Side of square windows, at least 8 px, each of which becomes one patch with the six numbers at its middle, flow and Jacobian, from a fit of second order to those of its pixels; the points returned are the middles. Covariances are those of independent pixels times the pixels over the disjoint windows in the patch, of the area `58 l^2` over which errors go together, and more where flow has edges in it. Six numbers pay for
         2 to 10 large patches (60 px and more) seen through a long lens. Windows lie side by side in the frame or `region`; those of which less than half is valid are left out. Not with `spacing`, `max_points`, `scene` and `robust`.
     **options
-        Those of `estimate_motion` but `sigma`, `cov`, `jacobian` and `projection`, which are the field's own; `robust` is True unless told otherwise or `patches` are asked for.
+        Those of `estimate_motion` but `sigma`, `cov`, `jacobian` and `projection`, which are the field's own; `robust` is True by default without `patches`.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def estimate_field_motion(
 
 
 def _own(options: dict[str, Any]) -> dict[str, Any]:
-    """The options without those that a field tells itself, which are refused unless they say nothing else."""
+    """The options without those that come from the field, which are refused unless they say nothing else."""
     for name, value in options.items():
         if name not in OPTIONS:
             raise TypeError(f"{name}: expected an option of estimate_field_motion or of estimate_motion, got one that neither has")
@@ -107,11 +107,11 @@ def _refuse_with_patches(**given: object) -> None:
 
 
 def _beside(scene: MotionEstimate, object_rotation_std: float, region: Sequence[int] | None) -> tuple[Array, Array]:
-    """What the scene's rotation says about that of a thing in it."""
+    """The rotation prior of an object from the scene's rotation."""
     if not isinstance(scene, MotionEstimate):
         raise TypeError(f"scene: expected a MotionEstimate, got {_kind(scene)}")
     if region is None:
-        raise ValueError("scene: expected a region beside it, of the thing whose motion is wanted, got no region")
+        raise ValueError("scene: expected a region beside it, of the object whose motion is wanted, got no region")
     known = _motion3d_beside(scene.rotation, scene.tangent, scene.covariance, object_rotation_std)
     if known is None:
         raise ValueError(f"scene: expected a motion whose rotation is known, got one with the status {scene.status!r}")
@@ -123,8 +123,8 @@ def time_to_contact_map(
 ) -> tuple[Array, Array, Array]:
     """Frames to contact at every pixel of a flow field, (H, W), their standard deviations, frames, and residuals, in units of noise.
 
-    Each pixel has the time of whatever it shows, `-1 / (nu u_z)` with the inverse depth of its own flow: positive when approaching, infinite where the motion has no translation, NaN where the field is not valid. Times count from half way between the frames with
-    "midpoint". The deviations are those of the pixel's own flow and of the motion, with what both have in common (`result.common_errors`); errors of neighbours go together over the field's `correlation_length`. A residual beyond 3 tells of something that moves by itself, whose time to contact is another one: see `region` of `estimate_field_motion`.
+    Each pixel has the time to contact of its point, `-1 / (nu u_z)` with the inverse depth of its own flow: positive when approaching, infinite where the motion has no translation, NaN where the field is not valid. Times count from half way between the frames with
+    "midpoint". The deviations are those of the pixel's own flow and of the motion, with what both have in common (`result.common_errors`); errors of neighbours go together over the field's `correlation_length`. A residual beyond 3 shows an object that moves by itself, whose time to contact is another one: see `region` of `estimate_field_motion`.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def time_to_contact_map(
     word("placement", placement)
     common = result.common_errors
     kind("result.common_errors", common, CommonEffect)
-    told = {
+    values = {
         "translation": result.translation,
         "rotation": result.rotation,
         "tangent": result.tangent,
@@ -156,4 +156,4 @@ def time_to_contact_map(
         "displacements": common.displacements,
         "moves": common.motion,
     }
-    return _motion3d_contact_map(field, K, told, placement)
+    return _motion3d_contact_map(field, K, values, placement)

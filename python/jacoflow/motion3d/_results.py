@@ -49,14 +49,14 @@ class MotionEstimate:
     rotation: Array
     """Rotation rate `w` (3,) of the scene relative to the camera, rad/frame."""
     status: Literal["ok", "few_points", "too_few_points", "rotation_only", "ambiguous", "ill_conditioned", "low_snr"]
-    """How far it can be trusted (no unit): "ok"; "few_points" (below 12 points or 5 patches, or too few to tell outliers from inliers); "too_few_points" (below 5 points or 2 patches: NaN); "rotation_only" (no translation within the noise: `u` NaN, `inv_depth` 0); "ambiguous" (another
-    motion explains the flow as well, see `alternatives`: that of a plane, the opposite direction in a narrow field, that of other points in a robust search, that of the flow by itself where it contradicts the `rotation_prior`); "ill_conditioned" (the points do not tell of all unknowns, `direction_std` is above 20 degrees or 1.5 times the field, its confidence interval has no end, or directions beyond the covariance explain the flow as well); "low_snr" (the depths are mostly noise: the covariance is that of smoothed weights)."""
+    """Whether the estimate is usable, or why not (no unit): "ok"; "few_points" (below 12 points or 5 patches, or too few to separate outliers from inliers); "too_few_points" (below 5 points or 2 patches: NaN); "rotation_only" (no translation within the noise: `u` NaN, `inv_depth` 0); "ambiguous" (another
+    motion explains the flow as well, see `alternatives`: that of a plane, the opposite direction in a narrow field, that of other points in a robust search, that of the flow alone where it contradicts the `rotation_prior`); "ill_conditioned" (the points do not determine all unknowns, `direction_std` is above 20 degrees or 1.5 times the field, its confidence interval has no end, or directions beyond the covariance explain the flow as well); "low_snr" (the depths are mostly noise: the covariance is that of smoothed weights)."""
     method_used: Literal["ml", "efficient"]
     """Whose result `translation` and `rotation` are (no unit)."""
     fell_back: bool
-    """Whether smoothed weights were asked for but led nowhere, so that the result is that of maximum likelihood (no unit)."""
+    """Whether smoothed weights were requested but had no solution, so that the result is that of maximum likelihood (no unit)."""
     covariance: Array
-    """Covariance (5, 5) of (psi, w): the direction is `u + psi @ tangent`, psi in rad, w in rad/frame. Where residuals are larger than the noise that was told, by more than chance, it is larger by as much."""
+    """Covariance (5, 5) of (psi, w): the direction is `u + psi @ tangent`, psi in rad, w in rad/frame. Where residuals are larger than the given noise, by more than chance, it is larger by as much."""
     tangent: Array
     """Axes (2, 3) of psi: unit vectors perpendicular to `u`, no unit."""
     common_errors: CommonEffect
@@ -72,7 +72,7 @@ class MotionEstimate:
     inv_depth_std: Array
     """Standard deviations (N,) of `inv_depth` from the noise of the point's own flow; infinite at the epipole."""
     inv_depth_smooth: Array
-    """Inverse depths (N,) drawn to their neighbours, as they weigh the equations; those of "ml" are `inv_depth`. NaN for points that do not obey the motion."""
+    """Inverse depths (N,) shrunk to their neighbours, as they weigh the equations; those of "ml" are `inv_depth`. NaN for outliers."""
     surface_slopes: Array | None
     """Slopes (N, 2) of the inverse depth along x and y in the weights, per unit of the plane at distance 1; None unless a Jacobian was given."""
     time_to_contact: Array
@@ -84,7 +84,7 @@ class MotionEstimate:
     approach_rate_std: float
     """Standard deviation of `approach_rate`, 1/frame, of the depths and of the motion."""
     inliers: NDArray[np.bool_]
-    """Points (N,) that obey the motion."""
+    """Inliers (N,) of the motion."""
     sigma: float
     """Standard deviation of each flow component, given or estimated, in units of the flow; 1 where covariances were given."""
     residuals: Array
@@ -100,13 +100,13 @@ class MotionEstimate:
         return -self.translation
 
 
-def estimate_of(told: dict[str, Any]) -> MotionEstimate:
-    """From what the compiled module tells."""
-    surfaces = told.pop("surfaces")
-    told["alternatives"] = tuple(MotionSolution(**other) for other in told["alternatives"])
-    told["ml"] = MotionSolution(**told["ml"])
-    told["common_errors"] = CommonEffect(**told["common_errors"])
-    return MotionEstimate(**told, surface_slopes=surfaces[:, 1:] if len(surfaces) else None)
+def estimate_of(values: dict[str, Any]) -> MotionEstimate:
+    """Builds the result from that of the compiled module."""
+    surfaces = values.pop("surfaces")
+    values["alternatives"] = tuple(MotionSolution(**other) for other in values["alternatives"])
+    values["ml"] = MotionSolution(**values["ml"])
+    values["common_errors"] = CommonEffect(**values["common_errors"])
+    return MotionEstimate(**values, surface_slopes=surfaces[:, 1:] if len(surfaces) else None)
 
 
 def time_to_contact(result: MotionEstimate) -> Array:

@@ -32,7 +32,7 @@ def predict_flow(
     translation, rotation : arrays (3,), the latter in rad/frame
         The motion. The translation need not have length 1: inverse depths are in units of its length.
     inv_depth : array (N,)
-        Inverse depths; with `whole_frame` half way in time, as `estimate_motion` tells them.
+        Inverse depths; with `whole_frame` half way in time, as `estimate_motion` returns them.
     K : array (3, 3) or None
         Camera matrix, px.
     projection : "plane" or "sphere"
