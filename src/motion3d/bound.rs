@@ -13,7 +13,7 @@ use crate::parallel::Threads;
 use nalgebra::{Matrix2x3, Vector2};
 
 /// Least number of points for a motion.
-const LEAST: usize = 5;
+const MIN_POINTS: usize = 5;
 
 /// Covariances of `(psi, w)` that theory predicts, rad and rad/frame, in the axes `tangent`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -76,14 +76,14 @@ fn of_known_depths(
         return Err(Error::argument("inv_depth", expected, inverse_depth.len()));
     }
     let observations = Whitening::new(points, noise, Placement::Start).whitened();
-    if observations.n < LEAST {
+    if observations.n < MIN_POINTS {
         let finite = (0..points.len()).filter(|&k| points.place(k).iter().all(|value| value.is_finite())).count();
-        return Err(too_few(LEAST, finite));
+        return Err(too_few(MIN_POINTS, finite));
     }
     let known: Vec<u32> = (0..observations.n as u32)
         .filter(|&k| inverse_depth[observations.source[k as usize] as usize].is_finite())
         .collect();
-    if known.len() < LEAST {
+    if known.len() < MIN_POINTS {
         return Err(Error::argument("inv_depth", "finite values at five points at least", known.len()));
     }
     let observations = observations.subset(&known);

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::math::random::CounterRng;
 
 /// Least number of points for a motion.
-const LEAST: usize = 5;
+const MIN_POINTS: usize = 5;
 
 /// Times that a rotation is taken out of displacements and inliers are searched again.
 const TURNS: usize = 2;
@@ -49,7 +49,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
             scaled.observations = scaled.observations.subset(&chosen);
         }
     }
-    if scaled.observations.n < LEAST {
+    if scaled.observations.n < MIN_POINTS {
         let sigma = if scaled.unknown { f64::NAN } else { sigma };
         return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, sigma);
     }

@@ -17,7 +17,7 @@ const INDEPENDENT: f64 = 4.0;
 const SPACED: f64 = 2.0;
 
 /// Least spacing, px, where the field does not know how far its errors go together.
-const LEAST_SPACING: f64 = 8.0;
+const MIN_SPACING: f64 = 8.0;
 
 /// Points closer than this many correlation lengths share so much of their errors that neither chance nor
 /// outliers can be judged with them as if they did not, and they would add little.
@@ -100,7 +100,7 @@ impl FieldPoints {
 /// positive.
 pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Result<FieldPoints> {
     measured(field)?;
-    let usual = LEAST_SPACING.max(SPACED * field.layout.correlation_length);
+    let usual = MIN_SPACING.max(SPACED * field.layout.correlation_length);
     let spacing = options.spacing.unwrap_or(usual);
     if !(spacing.is_finite() && spacing > 0.0) {
         return Err(Error::argument("spacing", "a positive number", spacing));

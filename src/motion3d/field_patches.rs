@@ -13,7 +13,7 @@ use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 use rayon::prelude::*;
 
 /// Least side of a window, px: six numbers of less add little to those of its pixels.
-const LEAST: usize = 8;
+const MIN_WINDOW_SIDE: usize = 8;
 
 /// The share of a window's sites that must be valid, for its middle not to lie beside what is seen of it.
 const SEEN: f64 = 0.5;
@@ -69,8 +69,8 @@ pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<
     if let Some(missing) = MOTION_NAMES.iter().find(|&&name| !field.layout.parameters.iter().any(|own| own == name)) {
         return Err(Error::argument("field", "flow with its Jacobian", format!("a field without {missing}")));
     }
-    if size < LEAST {
-        return Err(Error::argument("patches", format!("windows of at least {LEAST} px"), size));
+    if size < MIN_WINDOW_SIDE {
+        return Err(Error::argument("patches", format!("windows of at least {MIN_WINDOW_SIDE} px"), size));
     }
     let windows = Windows::new(&field.layout, region, size);
     let sites = windows.sites(field, region);

@@ -101,7 +101,7 @@ fn the_car_ahead_has_the_time_to_contact_that_the_laser_has() {
         let out = place.good(line).out;
         csv::Reader::from_reader(out.as_bytes()).deserialize().map(|row| row.unwrap()).collect()
     };
-    let (alone, known) = (rows(&line), rows(&format!("{line} --turning 0.0005")));
+    let (alone, known) = (rows(&line), rows(&format!("{line} --object-rotation-std 0.0005")));
     let ranges = ranges(&folder);
     let middle = 0.5 * (ranges.len() - 1) as f64;
     let (mut slope, mut squares) = (0.0, 0.0);

@@ -33,7 +33,7 @@ const CONSISTENT: f64 = 3.0;
 
 /// How many times the estimate's own deviation that of maximum likelihood may count: where it is larger
 /// still, it is the valley that is looked for.
-const MOST: f64 = 1.5;
+const MAX_LIKELIHOOD_RATIO: f64 = 1.5;
 
 /// Most points that are tested again where few leave a doubt.
 const ASKED_AGAIN: usize = 16_000;
@@ -190,7 +190,7 @@ fn otherwise_turned(
 /// What is farther than a covariance has it, of points whose deviations are `fewer` times larger.
 fn farther(own: f64, likelihood: f64, fewer: f64) -> Farther {
     Farther {
-        residuals: FAR * own.max(likelihood.min(MOST * own)) * fewer + SPACING,
+        residuals: FAR * own.max(likelihood.min(MAX_LIKELIHOOD_RATIO * own)) * fewer + SPACING,
         chance: CONSISTENT * own * fewer + SPACING,
     }
 }

@@ -21,7 +21,7 @@ const EPIPOLE: f64 = 1e-9;
 pub(crate) const ROUNDING: f64 = 1e-11;
 
 /// Points whose noise ellipses are measured, and the quantile of their ratios that is used.
-const ENOUGH: usize = 1000;
+const MAX_RATIO_POINTS: usize = 1000;
 const FAR_FROM_ROUND: f64 = 0.9;
 
 /// Ratios of a point's deviations along its two axes at which minima are looked for one after the other,
@@ -192,7 +192,7 @@ impl Observations {
     /// How many times as large noise is along one axis as along the other, of all but a tenth of the points
     /// at most.
     pub fn longest(&self) -> f64 {
-        let few = (0..self.n).step_by(self.n.div_ceil(ENOUGH).max(1));
+        let few = (0..self.n).step_by(self.n.div_ceil(MAX_RATIO_POINTS).max(1));
         let mut stretches: Vec<f64> = few.map(|k| self.stretch(k).0).collect();
         quantile(&mut stretches, FAR_FROM_ROUND).unwrap_or(0.0)
     }
@@ -299,7 +299,7 @@ impl KnownRotation {
 pub(crate) const PLANES: usize = 14;
 
 /// Noise of flow that is exactly zero, in its unit.
-pub(crate) const LEAST_NOISE: f64 = 1e-100;
+pub(crate) const MIN_NOISE: f64 = 1e-100;
 
 /// Points in units of their noise, and that in the flow's unit.
 pub(crate) struct Scaled {
@@ -314,7 +314,7 @@ pub(crate) struct Scaled {
 impl Scaled {
     /// Takes `sigma` in units of the present noise to be the noise.
     pub fn take(&mut self, sigma: f64) {
-        let sigma = sigma.max(ROUNDING * self.observations.median_flow()).max(LEAST_NOISE);
+        let sigma = sigma.max(ROUNDING * self.observations.median_flow()).max(MIN_NOISE);
         if sigma.is_finite() {
             self.observations.rescale(1.0 / sigma);
             self.sigma *= sigma;

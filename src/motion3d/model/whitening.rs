@@ -159,7 +159,7 @@ fn symmetric(matrix: Matrix2<f64>) -> Matrix2<f64> {
 }
 
 /// The share of a usual variance below which one is no measurement's.
-pub(crate) const LEAST: f64 = 1e-6;
+pub(crate) const MIN_VARIANCE_RATIO: f64 = 1e-6;
 
 /// The share of the points that are more precise than the usual one.
 pub(crate) const PRECISE: f64 = 0.25;
@@ -179,7 +179,11 @@ impl CovarianceFloor {
 
     /// The covariance that a point counts with.
     pub fn of(self, given: Matrix2<f64>) -> Matrix2<f64> {
-        if smallest(&given) < LEAST * self.usual { given + Matrix2::identity() * self.usual } else { given }
+        if smallest(&given) < MIN_VARIANCE_RATIO * self.usual {
+            given + Matrix2::identity() * self.usual
+        } else {
+            given
+        }
     }
 }
 
@@ -203,7 +207,7 @@ pub(crate) fn floored_covariances(covariances: &[f64], size: usize) -> Vec<f64> 
         let given = DMatrix::from_row_slice(size, size, given);
         let relative = DMatrix::from_fn(size, size, |i, j| given[(i, j)] / (usual[i] * usual[j]).sqrt());
         let finite = relative.iter().all(|value| value.is_finite());
-        let small = finite && SymmetricEigen::new(relative).eigenvalues.min() < LEAST;
+        let small = finite && SymmetricEigen::new(relative).eigenvalues.min() < MIN_VARIANCE_RATIO;
         if small { given + DMatrix::from_diagonal(&usual) } else { given }
     };
     covariances.chunks_exact(size * size).flat_map(|given| one(given).as_slice().to_vec()).collect()

@@ -48,7 +48,7 @@ pub struct AffinePatches<'a> {
 }
 
 /// Least number of patches for a motion, for a nearly unique one, and for a distribution of surfaces.
-const LEAST: usize = 2;
+const MIN_PATCHES: usize = 2;
 const FEW: usize = 5;
 const SMOOTHED: usize = 5;
 
@@ -150,7 +150,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     let points = patches.points;
     let mut system = beforehand(patches, options);
     let (used, n) = (system.patches.len(), points.len());
-    if used < LEAST {
+    if used < MIN_PATCHES {
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     }
     if let Some(rotation) = explained_by_rotation(&system) {
@@ -268,14 +268,14 @@ pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces
         return Err(Error::argument("inv_depth", expected, surfaces.len()));
     }
     let system = patches.system(Placement::Start, None);
-    if system.patches.len() < LEAST {
+    if system.patches.len() < MIN_PATCHES {
         let finite = |at: &&[f64; 2]| at.iter().all(|value| value.is_finite());
-        return Err(too_few(LEAST, patches.points.iter().filter(finite).count()));
+        return Err(too_few(MIN_PATCHES, patches.points.iter().filter(finite).count()));
     }
     let known: Vec<u32> = (0..system.patches.len() as u32)
         .filter(|&k| surfaces[system.source[k as usize] as usize].iter().all(|value| value.is_finite()))
         .collect();
-    if known.len() < LEAST {
+    if known.len() < MIN_PATCHES {
         return Err(Error::argument("inv_depth", "finite surfaces of two patches at least", known.len()));
     }
     let system = system.subset(&known);

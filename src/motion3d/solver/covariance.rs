@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen};
 
 /// Least eigenvalue of the information without the depths' noise, relative to that with it, that is still
 /// known to be positive.
-const LEAST_INFORMATION: f64 = 1e-3;
+const MIN_INFORMATION_RATIO: f64 = 1e-3;
 
 /// Least eigenvalue of an information in units of its own diagonal, below which it may be rounding; a field
 /// of half a degree leaves a million times as much.
@@ -54,7 +54,7 @@ pub(crate) fn plugged_in(h: &Matrix5, p: &Matrix5) -> Option<PluginCovariances> 
     let noise = whiten * p * whiten.transpose();
     let most = SymmetricEigen::new(noise).eigenvalues.max();
     // Not a number is not enough either.
-    let enough = 1.0 - most >= LEAST_INFORMATION;
+    let enough = 1.0 - most >= MIN_INFORMATION_RATIO;
     if !enough {
         return None;
     }

@@ -272,11 +272,11 @@ fn floor(
 }
 
 /// Points from which the spread of all is computed.
-const ENOUGH: usize = 1000;
+const MAX_SPREAD_POINTS: usize = 1000;
 
 /// Root mean square distance of points from their middle.
 fn spread(points: &[[f64; 3]]) -> f64 {
-    let few = || points.iter().step_by(points.len().div_ceil(ENOUGH).max(1)).map(|at| Vector3::from(*at));
+    let few = || points.iter().step_by(points.len().div_ceil(MAX_SPREAD_POINTS).max(1)).map(|at| Vector3::from(*at));
     let n = few().count().max(1) as f64;
     let middle: Vector3<f64> = few().sum::<Vector3<f64>>() / n;
     (few().map(|at| (at - middle).norm_squared()).sum::<f64>() / n).sqrt()

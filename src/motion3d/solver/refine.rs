@@ -11,7 +11,7 @@ pub(crate) const MANY: usize = 4000;
 pub(crate) const FEWER: usize = 2000;
 
 /// The largest share of `H` that may be noise of the depths where steps are taken without that.
-const MOST: f64 = 0.95;
+const MAX_NOISE_SHARE: f64 = 0.95;
 
 /// Deviations of a step that is near the minimum.
 const NEAR: f64 = 0.3;
@@ -75,7 +75,8 @@ fn step(equations: &Equations, n: usize, damping: f64) -> Option<Vector5> {
         step.iter().all(|value| value.is_finite()).then_some(step)
     };
     let careful = solved(*h)?;
-    let near = squared_deviations(equations, &careful, n) < NEAR * NEAR && (h - p / MOST).cholesky().is_some();
+    let near =
+        squared_deviations(equations, &careful, n) < NEAR * NEAR && (h - p / MAX_NOISE_SHARE).cholesky().is_some();
     if near { solved(h - p) } else { Some(careful) }
 }
 
@@ -165,7 +166,7 @@ mod tests {
         let least =
             refine(&observations, Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]), None, StoppingCriteria::FULL);
         let noisy = |share: f64| (least.equations.h - least.equations.p / share).cholesky().is_none();
-        assert!(noisy(0.7) && !noisy(MOST));
+        assert!(noisy(0.7) && !noisy(MAX_NOISE_SHARE));
         let near = least.motion.stepped(&least.tangent, &SMatrix::from([[0.004, -0.002, 0.0, 0.0, 0.0]]));
         let found = refine(&observations, near, None, StoppingCriteria { steps: 3, ..StoppingCriteria::FULL });
         assert!(found.motion.angle_to(&least.motion) < 1e-4, "{}", found.motion.angle_to(&least.motion));

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 const BAND: usize = 256;
 
 /// Most lanes.
-const MOST: usize = 16;
+const MAX_LANES: usize = 16;
 
 /// Weight that the farthest neighbour keeps.
 const TAIL: f64 = 0.001;
@@ -51,12 +51,12 @@ struct Regress<'a> {
 
 /// The neighbours number `j` of a group of points, seen from each of them in units of its reach.
 struct Group {
-    x: [f64; MOST],
-    y: [f64; MOST],
+    x: [f64; MAX_LANES],
+    y: [f64; MAX_LANES],
     /// Square distance.
-    d2: [f64; MOST],
-    nu: [f64; MOST],
-    s2: [f64; MOST],
+    d2: [f64; MAX_LANES],
+    nu: [f64; MAX_LANES],
+    s2: [f64; MAX_LANES],
 }
 
 impl Group {
@@ -83,13 +83,19 @@ impl Kernel<f64> for Regress<'_> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) {
-        let mut group = Group { x: [0.0; MOST], y: [0.0; MOST], d2: [0.0; MOST], nu: [0.0; MOST], s2: [0.0; MOST] };
+        let mut group = Group {
+            x: [0.0; MAX_LANES],
+            y: [0.0; MAX_LANES],
+            d2: [0.0; MAX_LANES],
+            nu: [0.0; MAX_LANES],
+            s2: [0.0; MAX_LANES],
+        };
         let (one, tail) = (V::constant(1.0), V::constant(TAIL));
         for start in (0..self.asked.len()).step_by(V::LANES) {
             let lanes = V::LANES.min(self.asked.len() - start);
-            let mut from = [Site::default(); MOST];
-            let mut axes = [None; MOST];
-            let mut scale = [0.0; MOST];
+            let mut from = [Site::default(); MAX_LANES];
+            let mut axes = [None; MAX_LANES];
+            let mut scale = [0.0; MAX_LANES];
             for lane in 0..lanes {
                 from[lane] = self.sites[self.asked[start + lane] as usize];
                 if self.spherical {
@@ -139,7 +145,7 @@ impl Kernel<f64> for Regress<'_> {
             let mixed = first.mul_add(second * v[1], first.mul_add(third * v[2], second * third * v[4]));
             let pure = first.mul_add(first * v[0], second.mul_add(second * v[3], third * third * v[5]));
             let c = (mixed + mixed + pure) * inverse * inverse;
-            let (mut at_q, mut at_c) = ([0.0; MOST], [0.0; MOST]);
+            let (mut at_q, mut at_c) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
             V::select(known, q, V::zero()).store(&mut at_q);
             V::select(known, c, V::constant(NO_PREDICTION)).store(&mut at_c);
             self.q[start..start + lanes].copy_from_slice(&at_q[..lanes]);

@@ -24,7 +24,7 @@ const LONGEST: f64 = 4.0;
 const STEP: f64 = 1.15;
 
 /// Points that sums over pairs are made from; of more, every so manieth stands for its neighbours.
-const ENOUGH: usize = 2000;
+const MAX_PAIR_POINTS: usize = 2000;
 
 /// The least share of the errors' variance that is left in residuals, for them to determine it.
 const LEFT: f64 = 0.1;
@@ -200,7 +200,7 @@ impl Neighbourhood {
     /// What is added up over all points, or over those that stand for them, and how many each of these stands
     /// for; in one order, whoever computes it.
     fn parts<S: Send>(&self, of_point: impl Fn(usize) -> S + Sync + Send) -> (Vec<S>, f64) {
-        let step = self.all.len().div_ceil(ENOUGH).max(1);
+        let step = self.all.len().div_ceil(MAX_PAIR_POINTS).max(1);
         let chosen: Vec<usize> = (step / 2..self.all.len()).step_by(step).collect();
         let each = self.all.len() as f64 / chosen.len().max(1) as f64;
         (chosen.into_par_iter().map(of_point).collect(), each)
