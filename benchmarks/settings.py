@@ -54,12 +54,10 @@ class Setting:
 def windowed(smooth: float, window: float, **more: Any) -> Setting:
     """The single-level windowed estimator."""
     options = {
-        "method": "windowed",
-        "smooth": smooth,
-        "window_sigma": window,
+        "method": jacoflow.Windowed(window_sigma=window, **more),
+        "preprocess": jacoflow.Preprocess(smooth=smooth),
         "covariance": False,
         "precision": "float64",
-        **more,
     }
     return Setting(
         f"windowed, one level, smoothed {smooth:g} px, window {window:g} px", options, window=window
@@ -68,7 +66,7 @@ def windowed(smooth: float, window: float, **more: Any) -> Setting:
 
 def coarse_to_fine(preset: str, frames: int = 3) -> Setting:
     """The estimator for everyday frames."""
-    options = {"method": "coarse_to_fine", "preset": preset, "covariance": False}
+    options = {"method": jacoflow.CoarseToFine(preset=preset), "covariance": False}
     return Setting(
         f"coarse to fine, {preset}" + (", pair" if frames == 2 else ""),
         options,

@@ -71,7 +71,7 @@ def look(t: float) -> np.ndarray:
 
 def main() -> None:
     frames = [look(t) for t in (-1.0, 0.0, 1.0)]
-    field = jacoflow.estimate(frames, method="windowed", window_sigma=4.0, fps=FPS)
+    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0), fps=FPS)
     # With the frame rate known, rates come per second.
     divergence, spread = np.asarray(field.divergence), np.asarray(field.std("divergence"))
     print(f"{'what':24} {'divergence (truth)':>20} {'time to contact':>22} {'across, px/frame':>16}   verdict")

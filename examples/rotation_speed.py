@@ -26,7 +26,7 @@ def main() -> None:
     )
     camera = scenes.Sensor(noise=1.5, rounding="nearest", saturate=True, random_state=2)
     frames = np.array([camera.apply_u8(frame, index=k) for k, frame in enumerate(disc.frames(12))])
-    fields = jacoflow.estimate(frames, method="windowed", window_sigma=5.0, fps=FPS)
+    fields = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=5.0), fps=FPS)
     # The part of the picture well inside the disc.
     y, x = np.mgrid[0 : PATCH[1], 0 : PATCH[0]]
     inside = np.hypot(x + CORNER[0] - AXIS[0], y + CORNER[1] - AXIS[1]) < RADIUS - 15

@@ -20,6 +20,8 @@
 
 #[doc(hidden)]
 pub mod ablation;
+#[cfg(feature = "temporal")]
+mod buffer_pool;
 pub mod error;
 #[cfg(feature = "filter")]
 pub mod filter;

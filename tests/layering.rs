@@ -14,6 +14,7 @@ use source::{files, name_of, root};
 /// Folder (or file) under `src/` and its level.
 const LEVELS: &[(&str, u8)] = &[
     ("ablation", 0),
+    ("buffer_pool", 0),
     ("error", 0),
     ("types", 0),
     ("math", 0),
@@ -37,7 +38,7 @@ const LEVELS: &[(&str, u8)] = &[
 ];
 
 /// Level 0 is ordered too: each may use only those before it.
-const FOUNDATION: &[&str] = &["ablation", "error", "math", "simd", "parallel", "types"];
+const FOUNDATION: &[&str] = &["ablation", "error", "math", "simd", "parallel", "buffer_pool", "types"];
 
 fn level(room: &str) -> Option<u8> {
     LEVELS.iter().find(|(name, _)| *name == room).map(|(_, level)| *level)

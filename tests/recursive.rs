@@ -7,10 +7,10 @@
 use jacoflow::flow::coarse_to_fine::CoarseToFineOptions;
 use jacoflow::flow::windowed::WindowedOptions;
 use jacoflow::flow::{Estimator, EstimatorOptions, Method};
-use jacoflow::pipeline::{EstimatorStage, Stage};
+use jacoflow::image::Preprocess;
 use jacoflow::synth::{AffineTexture, Scene, Sensor};
-use jacoflow::temporal::{RecursiveFusion, RecursiveOptions};
-use jacoflow::types::{FlowField, Frame, Rect, SamplingGrid, Status};
+use jacoflow::temporal::{FlowStream, RecursiveFusion, RecursiveOptions, StreamPlan};
+use jacoflow::types::{AnyFrame, FlowField, Frame, Rect, SamplingGrid, Status};
 use nalgebra::{Matrix6, Vector6};
 use std::sync::Arc;
 
@@ -48,6 +48,14 @@ fn seen(motion: [f64; 6], noise: f64, times: impl Iterator<Item = usize>, seed: 
 
 fn frames(motion: [f64; 6], noise: f64, count: usize, seed: u64) -> Vec<Arc<Frame<f32>>> {
     seen(motion, noise, 0..count, seed)
+}
+
+fn stream(estimator: Estimator, recursive: Option<RecursiveOptions>) -> FlowStream<f32> {
+    FlowStream::new(StreamPlan::new(estimator, Preprocess::default(), recursive).unwrap()).unwrap()
+}
+
+fn any(frame: &Frame<f32>) -> AnyFrame {
+    AnyFrame::F32(frame.clone())
 }
 
 /// The true motion, which is affine about the middle of the frame.
@@ -135,10 +143,10 @@ fn a_stream_tells_its_errors_down_to_the_floor() {
         ("windowed pairs", Method::Windowed(WindowedOptions::pair()), SLOW, 4.0),
     ] {
         let estimator = Estimator::new(method, common()).unwrap();
-        let mut stage = EstimatorStage::recursive(estimator, Some(RecursiveOptions::default())).unwrap();
+        let mut stream = stream(estimator, Some(RecursiveOptions::default()));
         let (mut first, mut last) = (None, (0.0, 0.0));
         for frame in frames(motion, noise, 26, 1) {
-            let Some((field, _)) = stage.push(frame).unwrap() else { continue };
+            let Some(field) = stream.push(any(&frame)).unwrap() else { continue };
             last = score(motion, &field);
             first.get_or_insert(last.0);
             assert!(last.1 < 8.5, "{name}, {motion:?}, noise {noise}: {}", last.1);
@@ -213,14 +221,14 @@ fn a_changed_motion_is_followed_at_once() {
     for method in [windowed(), coarse_to_fine(3)] {
         let name = method.name();
         let estimator = || Estimator::new(method.clone(), common()).unwrap();
-        let mut plain = EstimatorStage::new(estimator());
-        let mut fused = EstimatorStage::recursive(estimator(), Some(RecursiveOptions::default())).unwrap();
+        let mut plain = stream(estimator(), None);
+        let mut fused = stream(estimator(), Some(RecursiveOptions::default()));
         let times = (0..=TURN).chain((0..TURN).rev());
         let mut worst = 0.0_f64;
         for (k, frame) in seen(REFERENCE, 2.0, times, 1).into_iter().enumerate() {
-            let (one, other) = (plain.push(Arc::clone(&frame)).unwrap(), fused.push(frame).unwrap());
+            let (one, other) = (plain.push(any(&frame)).unwrap(), fused.push(any(&frame)).unwrap());
             // Until the three frames are all of the way back.
-            let (Some((one, _)), Some((other, _)), true) = (one, other, k > TURN + 1) else { continue };
+            let (Some(one), Some(other), true) = (one, other, k > TURN + 1) else { continue };
             let (single, (error, normalised)) = (score(back, &one), score(back, &other));
             println!("{name}, {} frames after the turn: {error:.6} and {:.6}, {normalised:.1}", k - TURN, single.0);
             worst = worst.max(single.0);
@@ -234,14 +242,14 @@ fn a_changed_motion_is_followed_at_once() {
 #[test]
 fn a_hole_damages_its_time_only() {
     let estimator = Estimator::new(windowed(), common()).unwrap();
-    let mut stage = EstimatorStage::recursive(estimator, Some(RecursiveOptions::default())).unwrap();
+    let mut stream = stream(estimator, Some(RecursiveOptions::default()));
     let mut variance = 0.0;
     for (t, frame) in frames(SLOW, 2.0, 12, 1).into_iter().enumerate() {
         let mut frame = (*frame).clone();
         if t == 6 {
             frame.data_mut()[44 * SIDE + 44] = f32::NAN;
         }
-        let Some((field, _)) = stage.push(Arc::new(frame)).unwrap() else { continue };
+        let Some(field) = stream.push(AnyFrame::F32(frame)).unwrap() else { continue };
         let site = 4 * 8 + 4;
         let now = field.covariance_at(site).unwrap()[0][0];
         let seen = (6..9).contains(&t);

@@ -33,9 +33,8 @@ ASKED = (0.92, 0.97)
 
 def estimate(frames: list[Any], preset: str) -> jacoflow.FlowField:
     """The estimate whose intervals are looked at."""
-    return jacoflow.estimate(
-        frames, method="coarse_to_fine", preset=preset, time_scheme="pair" if len(frames) == 2 else None
-    )
+    method = jacoflow.CoarseToFine(preset=preset, time_scheme="pair" if len(frames) == 2 else None)
+    return jacoflow.estimate(frames, method=method)
 
 
 def held(

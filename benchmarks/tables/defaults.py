@@ -9,6 +9,7 @@ described). Frames have 8 bits; a margin of 20 px is left out.
 """
 
 import itertools
+from typing import Any
 
 import numpy as np
 
@@ -35,13 +36,15 @@ SCENES = [
 
 
 def measure(
-    name: str, carrier: str | None, noise: float, options: dict[str, object]
+    name: str, carrier: str | None, noise: float, options: dict[str, Any]
 ) -> tuple[float, float, float, float]:
     """Errors of flow and Jacobian, and coverage of both, in the middle of three frames."""
     scene = scenes.Scene(name, width=128, height=112, random_state=5, carrier=carrier)
     camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=1)
     frames = [camera.apply_u8(scene.frame(t), index) for index, t in enumerate((-1.0, 0.0, 1.0))]
-    field, truth = jacoflow.estimate(frames, **options), scene.truth(0.0)
+    method = jacoflow.Windowed(rows=options["rows"])
+    field = jacoflow.estimate(frames, method=method, preprocess=jacoflow.Preprocess(smooth=options["smooth"]))
+    truth = scene.truth(0.0)
     inner = np.zeros(field.shape, bool)
     inner[MARGIN:-MARGIN, MARGIN:-MARGIN] = True
     known = inner & field.valid & truth.valid
@@ -58,7 +61,7 @@ def measure(
     )
 
 
-def choices() -> list[dict[str, object]]:
+def choices() -> list[dict[str, Any]]:
     """Options that are compared."""
     return [
         dict(rows=rows, smooth=smooth)

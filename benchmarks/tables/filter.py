@@ -81,7 +81,7 @@ def speed(rounds: int) -> list[dict[str, object]]:
 
 def follow(stack: NDArray[np.floating], form: str, dtype: str, threads: int) -> jacoflow.FlowField:
     """The last field of a filter that has seen the stack."""
-    tracker = jacoflow.FlowFilter(form=form, precision=dtype, threads=threads)
+    tracker = jacoflow.FlowFilter(profile=jacoflow.FilterProfile(form=form), precision=dtype, threads=threads)
     field = None
     for frame in stack:
         field = tracker.push(frame)
@@ -104,7 +104,7 @@ def agreement(frames: int = 400) -> list[dict[str, object]]:
             measurements, settings, augmented=form == "augmented", motion_first=form == "fast"
         )
         for dtype in ("float64", "float32"):
-            tracker = jacoflow.FlowFilter(form=form, precision=dtype, points=[(32, 32)])
+            tracker = jacoflow.FlowFilter(profile=jacoflow.FilterProfile(form=form), precision=dtype, grid=jacoflow.SamplingGrid(points=[(32, 32)]))
             ours = []
             for image in stack:
                 field = tracker.push(image.astype(dtype))

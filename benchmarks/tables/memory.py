@@ -64,15 +64,10 @@ def highest() -> float:
 def measure(file: str, preset: str, count: int, covariance: bool) -> float:
     """Planes that the estimate from the last `count` frames of the file needs, in this process."""
     given = [np.ascontiguousarray(frame) for frame in np.load(file)[-count:]]
-    settings = {
-        "method": "coarse_to_fine",
-        "preset": preset,
-        "covariance": covariance,
-        "time_scheme": "pair" if count == 2 else None,
-    }
-    jacoflow.estimate([frame[:WARM_UP, :WARM_UP] for frame in given], **settings)
+    method = jacoflow.CoarseToFine(preset=preset, time_scheme="pair" if count == 2 else None)
+    jacoflow.estimate([frame[:WARM_UP, :WARM_UP] for frame in given], method=method, covariance=covariance)
     before = highest()
-    jacoflow.estimate(given, **settings)
+    jacoflow.estimate(given, method=method, covariance=covariance)
     return (highest() - before) / (4.0 * given[0].size)
 
 

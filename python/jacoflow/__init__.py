@@ -1,7 +1,7 @@
 """Optical flow together with its Jacobian and the uncertainty of both.
 
-Frames are arrays (H, W), indexed [row, column] = [y, x]; x right, y down. Flow (u, v) is in px/frame along (x, y); the Jacobian
-is [[u_x, u_y], [v_x, v_y]] in 1/frame.
+Frames are arrays (H, W), indexed [row, column] = [y, x]; x right, y down. Flow (u, v) is in px/frame along
+(x, y); the Jacobian is [[u_x, u_y], [v_x, v_y]] in 1/frame.
 
 >>> import jacoflow
 >>> frames = jacoflow.scenes.Scene("affine", width=96, height=64).frames(3)
@@ -34,21 +34,41 @@ from ._jacoflow import (
     smooth,
 )
 from ._observability import Condition, Observability, ObservabilityMap, classify, observability
+from ._options import (
+    CoarseToFine,
+    FilterProfile,
+    HornSchunck,
+    Instantaneous,
+    LucasKanade,
+    Preprocess,
+    Recursive,
+    SamplingGrid,
+    Windowed,
+)
 from .status import Status
 
 __all__ = [
+    "CoarseToFine",
     "Condition",
+    "FilterProfile",
     "FlowEstimator",
     "FlowField",
     "FlowFilter",
     "FormatError",
+    "HornSchunck",
+    "Instantaneous",
     "JacoflowError",
+    "LucasKanade",
     "MissingDependencyError",
     "NotObservableError",
     "NumericalError",
     "Observability",
     "ObservabilityMap",
+    "Preprocess",
+    "Recursive",
+    "SamplingGrid",
     "Status",
+    "Windowed",
     "__version__",
     "classify",
     "corners",
@@ -76,7 +96,7 @@ if _TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> _Any:
-    """`jacoflow.mixture`, imported when it is first asked for: it looks for scikit-learn, whose import takes longer than ours."""
+    """`jacoflow.mixture`, imported on first use, because importing scikit-learn takes long."""
     if name == "mixture":
         return _import_module("jacoflow.mixture")
     raise AttributeError(f"module 'jacoflow' has no attribute {name!r}")

@@ -1,4 +1,5 @@
-"""The command line: `python -m jacoflow` and the console script `jacoflow` are the binary of the same name."""
+"""The command line: `python -m jacoflow` and the console script `jacoflow` are the binary of the same
+name."""
 
 import sys
 

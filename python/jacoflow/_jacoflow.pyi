@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
+from ._options import FilterProfile, FlowMethod, Fusion, Preprocess, SamplingGrid
+
 __all__ = [
     "_run_command_line",
     "FormatError",
@@ -100,14 +102,6 @@ _Path: TypeAlias = str | os.PathLike[str]
 _Frame: TypeAlias = NDArray[Any]
 _Frames: TypeAlias = NDArray[Any] | Iterable[NDArray[Any]]
 _Rectangle: TypeAlias = Sequence[int] | NDArray[np.integer[Any]]
-_Method: TypeAlias = Literal["windowed", "coarse_to_fine", "instantaneous", "lucas_kanade", "horn_schunck"]
-_Preset: TypeAlias = Literal["fast", "balanced", "accurate"]
-_Model: TypeAlias = Literal["affine", "translational", "accelerating"]
-_Scheme: TypeAlias = Literal["forward", "central", "backward", "pair"]
-_Rows: TypeAlias = Literal["brightness", "gradient", "jet", "all"]
-_Rank: TypeAlias = Literal["nan", "min_norm"]
-_Temporal: TypeAlias = Literal["none", "recursive"]
-_Colour: TypeAlias = Literal["error", "luminance"]
 _Precision: TypeAlias = Literal["float32", "float64"]
 _Simd: TypeAlias = Literal["scalar", "avx2", "avx512"]
 _Progress: TypeAlias = bool | Callable[[int, int], object]
@@ -132,12 +126,14 @@ class MissingDependencyError(JacoflowError):
 class FlowField:
     """Flow with its Jacobian, covariance and status: the result of every estimator.
 
-    Arrays have the site axes (H, W), (N,) for points, with a leading T for a stack; `field[t]` is one field of a stack. Flow in px/frame, derivatives in
-    1/frame (or in units of `pixel_pitch`). NaN where `status` says why. Most arrays are read-only views that share memory.
+    Arrays have the site axes (H, W), (N,) for points, with a leading T for a stack; `field[t]` is one field
+    of a stack. Flow in px/frame, derivatives in 1/frame (or in units of `pixel_pitch`). NaN where `status`
+    says why. Most arrays are read-only views that share memory.
     """
     @property
     def flow(self) -> _Floats:
-        """Flow, array (..., H, W, 2): (u, v) in px/frame along x (right) and y (down), or in units of `pixel_pitch` per frame.
+        """Flow, array (..., H, W, 2): (u, v) in px/frame along x (right) and y (down), or in units of
+        `pixel_pitch` per frame.
 
         NaN where `status` says why. A read-only view.
         """
@@ -167,7 +163,8 @@ class FlowField:
         """dv/dy, array (..., H, W), 1/frame."""
     @property
     def covariance(self) -> _Floats | None:
-        """Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), px/frame and 1/frame squared; None if it was not asked for.
+        """Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), px/frame and 1/frame squared; None
+        if it was not requested.
 
         Rows and columns of parameters that the model lacks are zero. A new array at every access.
         """
@@ -179,31 +176,40 @@ class FlowField:
         """Where the estimate is unique and complete, bool array (..., H, W)."""
     @property
     def residual(self) -> _Floats | None:
-        """Root mean square residual of the equations, array (..., H, W), grey levels; None if the method has none."""
+        """Root mean square residual of the equations, array (..., H, W), grey levels; None if the method has
+        none."""
     @property
     def rank(self) -> NDArray[np.uint8] | None:
         """Rank of the equations, uint8 array (..., H, W); None if the method has none."""
     @property
     def condition(self) -> _Floats | None:
-        """Condition number of the equations (largest over smallest singular value), array (..., H, W); None if the method has none."""
+        """Condition number of the equations (largest over smallest singular value), array (..., H, W); None if
+        the method has none.
+        """
     @property
     def window(self) -> _Floats | None:
-        """Standard deviation of the Gaussian window that the Jacobian rests on, mean of those weighed in at the pixel, array (..., H, W), px; None unless `method="coarse_to_fine"` with `diagnostics=True`.
+        """Standard deviation of the Gaussian window that the Jacobian rests on, mean of those weighed in at the
+        pixel, array (..., H, W), px; None unless `method="coarse_to_fine"` with `diagnostics=True`.
 
-        Windows are of fourth order: slopes have the noise of a plain least-squares fit in a window 0.66 times as wide, and bias of sixth order.
+        Windows are of fourth order: slopes have the noise of a plain least-squares fit in a window 0.66 times
+        as wide, and bias of sixth order.
         """
     @property
     def divergence(self) -> NDArray[np.float64]:
         """Divergence u_x + v_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
     @property
     def curl(self) -> NDArray[np.float64]:
-        """Curl v_x - u_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns clockwise on the screen."""
+        """Curl v_x - u_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns
+        clockwise on the screen."""
     @property
     def shear_magnitude(self) -> NDArray[np.float64]:
-        """Shear sqrt((u_x - v_y)^2 + (u_y + v_x)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
+        """Shear sqrt((u_x - v_y)^2 + (u_y + v_x)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame
+        period."""
     @property
     def shear_axis(self) -> NDArray[np.float64]:
-        """Direction of the greatest stretch, atan2(u_y + v_x, u_x - v_y) / 2, float64 array (..., H, W), rad in (-pi/2, pi/2], from x towards y."""
+        """Direction of the greatest stretch, atan2(u_y + v_x, u_x - v_y) / 2, float64 array (..., H, W), rad in
+        (-pi/2, pi/2], from x towards y.
+        """
     @property
     def strain_xx(self) -> NDArray[np.float64]:
         """Stretch u_x along x, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
@@ -218,29 +224,36 @@ class FlowField:
         """Angular velocity (v_x - u_y) / 2, float64 array (..., H, W), rad/frame, or rad/s with a frame period."""
     @property
     def rpm(self) -> NDArray[np.float64]:
-        """Angular velocity, float64 array (..., H, W), revolutions per minute; ValueError without fps or frame_period."""
+        """Angular velocity, float64 array (..., H, W), revolutions per minute; ValueError without fps or
+        frame_period."""
     @property
     def rotation_centre(self) -> NDArray[np.float64]:
-        """The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units of the pixel pitch.
+        """The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units of
+        the pixel pitch.
 
-        It need not be in the picture. NaN where there is none. `value` and `std` take its parts, rotation_centre_x and rotation_centre_y.
+        It need not be in the picture. NaN where there is none. `value` and `std` take its parts,
+        rotation_centre_x and rotation_centre_y.
         """
     @property
     def centre_distance(self) -> NDArray[np.float64]:
         """Distance of the point that does not move, float64 array (..., H, W), px, or units of the pixel pitch."""
     @property
     def time_to_contact(self) -> NDArray[np.float64]:
-        """Time 2 / (u_x + v_y) until contact with a surface parallel to the image, float64 array (..., H, W), frames, or s with a frame period; negative while it recedes."""
+        """Time 2 / (u_x + v_y) until contact with a surface parallel to the image, float64 array (..., H, W),
+        frames, or s with a frame period; negative while it recedes."""
     @property
     def speed(self) -> NDArray[np.float64]:
         """Speed sqrt(u^2 + v^2), float64 array (..., H, W), px/frame, or px/s with a frame period."""
     def value(self, /, name: str) -> NDArray[np.float64]:
-        """The parameter or derived quantity `name`, float64 array (..., H, W), in the unit that `unit(name)` tells.
+        """The parameter or derived quantity `name`, float64 array (..., H, W), in the unit that `unit(name)`
+        gives.
 
-        Names are those of `parameters` and of `quantities()`. ValueError for another name, and for rpm without a frame period.
+        Names are those of `parameters` and of `quantities()`. ValueError for another name, and for rpm
+        without a frame period.
         """
     def std(self, /, name: str) -> NDArray[np.float64]:
-        """Standard deviation of the parameter or derived quantity `name`, float64 array (..., H, W), in its unit: sqrt(g^T Cov g) with its gradient g.
+        """Standard deviation of the parameter or derived quantity `name`, float64 array (..., H, W), in its
+        unit: sqrt(g^T Cov g) with its gradient g.
 
         ValueError for another name and for a field without covariance.
         """
@@ -251,39 +264,53 @@ class FlowField:
         region: _Rectangle | None = None,
         aggregate: Literal["inverse_variance", "median"] | None = None,
     ) -> tuple[float, float, int]:
-        """One number for a region: (value, standard deviation, number of sites) of the parameter or derived quantity `name`, in its unit.
+        """One number for a region: (value, standard deviation, number of sites) of the parameter or derived
+        quantity `name`, in its unit.
 
-        `region` (x, y, width, height) px, None for every site; `aggregate` "inverse_variance" weighs by the covariance, "median" does without.
-        The standard deviation allows for the correlation of neighbouring estimates, and for an error that they have in common: what they claim and do not scatter. A single field only. ValueError for unknown names and for "inverse_variance" without covariance.
+        `region` (x, y, width, height) px, None for every site; `aggregate` "inverse_variance" weighs by the
+        covariance, "median" does without. The standard deviation allows for the correlation of neighbouring
+        estimates, and for an error that they have in common: what they claim and do not scatter. A single
+        field only. ValueError for unknown names and for "inverse_variance" without covariance.
         """
     @overload
     def advect(self, /, points: ArrayLike, covariance: None = None) -> NDArray[np.float64]:
-        """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its fields, (T + 1, N, 2), beginning with `points`.
+        """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its
+        fields, (T + 1, N, 2), beginning with `points`.
 
-        `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites the flow is bilinear in what the four sites about a point
-        say of it by flow and Jacobian: affine motion is exact. NaN outside the sites, where one of them is not `valid`, and from then on.
+        `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites
+        the flow is bilinear in what the four sites about a point say of it by flow and Jacobian: affine
+        motion is exact. NaN outside the sites, where one of them is not `valid`, and from then on.
 
-        With `covariance`, (N, 2, 2) or (2, 2) for all points, px^2, a pair: the points, and their covariance (N, 2, 2), for a stack (T + 1, N, 2, 2). It becomes
-        (I + M) C (I + M)^T with the Jacobian M, plus the covariance of the flow there where the field has one: errors of the flow are taken as independent of
-        the point's and from field to field, and as alike at neighbouring sites. Zeros begin with certain points.
+        With `covariance`, (N, 2, 2) or (2, 2) for all points, px^2, a pair: the points, and their covariance
+        (N, 2, 2), for a stack (T + 1, N, 2, 2). It becomes (I + M) C (I + M)^T with the Jacobian M, plus the
+        covariance of the flow there where the field has one: errors of the flow are taken as independent of
+        the point's and from field to field, and as alike at neighbouring sites. Zeros begin with certain
+        points.
 
-        A grid in px only: ValueError for a list of points, for another `pixel_pitch` than 1, for other shapes, and for matrices that are no covariance.
+        A grid in px only: ValueError for a list of points, for another `pixel_pitch` than 1, for other
+        shapes, and for matrices that are no covariance.
         """
     @overload
     def advect(self, /, points: ArrayLike, covariance: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its fields, (T + 1, N, 2), beginning with `points`.
+        """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its
+        fields, (T + 1, N, 2), beginning with `points`.
 
-        `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites the flow is bilinear in what the four sites about a point
-        say of it by flow and Jacobian: affine motion is exact. NaN outside the sites, where one of them is not `valid`, and from then on.
+        `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites
+        the flow is bilinear in what the four sites about a point say of it by flow and Jacobian: affine
+        motion is exact. NaN outside the sites, where one of them is not `valid`, and from then on.
 
-        With `covariance`, (N, 2, 2) or (2, 2) for all points, px^2, a pair: the points, and their covariance (N, 2, 2), for a stack (T + 1, N, 2, 2). It becomes
-        (I + M) C (I + M)^T with the Jacobian M, plus the covariance of the flow there where the field has one: errors of the flow are taken as independent of
-        the point's and from field to field, and as alike at neighbouring sites. Zeros begin with certain points.
+        With `covariance`, (N, 2, 2) or (2, 2) for all points, px^2, a pair: the points, and their covariance
+        (N, 2, 2), for a stack (T + 1, N, 2, 2). It becomes (I + M) C (I + M)^T with the Jacobian M, plus the
+        covariance of the flow there where the field has one: errors of the flow are taken as independent of
+        the point's and from field to field, and as alike at neighbouring sites. Zeros begin with certain
+        points.
 
-        A grid in px only: ValueError for a list of points, for another `pixel_pitch` than 1, for other shapes, and for matrices that are no covariance.
+        A grid in px only: ValueError for a list of points, for another `pixel_pitch` than 1, for other
+        shapes, and for matrices that are no covariance.
         """
     def unit(self, /, name: str) -> str:
-        """Unit of the parameter or derived quantity `name` for a pixel pitch of 1 px. ValueError for another name."""
+        """Unit of the parameter or derived quantity `name` for a pixel pitch of 1 px. ValueError for another
+        name."""
     @property
     def points(self) -> NDArray[np.int64]:
         """Pixel (x, y) of each site, int64 array (H, W, 2), for a list of points (N, 2)."""
@@ -301,25 +328,30 @@ class FlowField:
         """Physical size (dx, dy) of a pixel, 1 px or any length unit."""
     @property
     def correlation_length(self) -> float:
-        """How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0 where they are independent or it is not known."""
+        """How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0
+        where they are independent or it is not known.
+        """
     @property
     def model(self) -> str:
         """Name of the motion model (no unit)."""
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Names of the model's parameters; `unit(name)` tells their units."""
+        """Names of the model's parameters; `unit(name)` gives their units."""
     @property
     def shape(self) -> tuple[int, ...]:
         """Shape of the site axes: (H, W), (N,) for points, with a leading T for a stack."""
     def save(self, /, path: _Path, *, options: str = "") -> None:
-        """Writes the field; the extension of `path` chooses the format: .npz (everything, in its units), .flo, .png (KITTI) or .pfm (flow in px/frame only).
+        """Writes the field; the extension of `path` chooses the format: .npz (everything, in its units), .flo,
+        .png (KITTI) or .pfm (flow in px/frame only).
 
-        A stack goes to a folder (`path` without extension) as flow_000001.npz, ... by frame index. `options` is free text kept in .npz.
-        OSError when the file cannot be written, ValueError for another extension.
+        A stack goes to a folder (`path` without extension) as flow_000001.npz, ... by frame index. `options`
+        is free text kept in .npz. OSError when the file cannot be written, ValueError for another extension.
         """
     @staticmethod
     def load(path: _Path) -> FlowField:
-        """Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError for a damaged file."""
+        """Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError
+        for a damaged file.
+        """
     def __len__(self, /) -> int: ...
     def __bool__(self, /) -> Literal[True]: ...
     def __getitem__(self, index: int | slice, /) -> FlowField: ...
@@ -328,33 +360,16 @@ class FlowField:
 def estimate(
     frames: _Frames,
     *,
-    method: _Method = "coarse_to_fine",
-    preset: _Preset | None = None,
-    levels: int | None = None,
-    model: _Model = "affine",
-    time_scheme: _Scheme | None = None,
-    neighbourhood: tuple[int, int] | ArrayLike | None = None,
-    neighbourhood_sigma: float | None = None,
-    window_sigma: float | None = None,
-    rows: _Rows | None = None,
-    smoothness: float | None = None,
-    iterations: int | None = None,
-    rank_deficient: _Rank = "nan",
-    smooth: float | None = None,
-    quantise: float | None = None,
-    colour: _Colour | None = None,
-    points: ArrayLike | None = None,
-    region: _Rectangle | None = None,
-    stride: int | None = None,
-    mask: NDArray[np.bool_] | None = None,
-    fps: float | None = None,
-    frame_period: float | None = None,
-    pixel_pitch: float | tuple[float, float] | None = None,
+    method: FlowMethod | None = None,
+    temporal: Fusion | None = None,
     covariance: bool | None = None,
-    diagnostics: bool = False,
     noise: float | None = None,
-    temporal: _Temporal | None = None,
-    forgetting: float | None = None,
+    diagnostics: bool = False,
+    grid: SamplingGrid | None = None,
+    mask: NDArray[np.bool_] | None = None,
+    preprocess: Preprocess | None = None,
+    fps: float | None = None,
+    pixel_pitch: float | tuple[float, float] | None = None,
     precision: _Precision | None = None,
     threads: int | None = None,
     simd: _Simd | None = None,
@@ -362,89 +377,57 @@ def estimate(
 ) -> FlowField:
     """Flow, its Jacobian and their covariance, from two or three frames or from a stack.
 
-    A list or tuple of three frames (H, W) gives one FlowField (H, W), one of two frames as well (every method but "instantaneous"); a longer list
-    gives a stack (T - 2, H, W), and so does an array (T, H, W) of any length. Frames are uint8, uint16, float32 or float64 in any grey scale: the intensity
-    gain does not change the flow. float64 is computed in float64, everything else in float32. Inputs are never modified.
+    A list or tuple of three frames (H, W) gives one FlowField (H, W), one of two frames as well
+    (every method but "instantaneous"); a longer list gives a stack (T - 2, H, W), and so does an
+    array (T, H, W) of any length. Frames are uint8, uint16, float32 or float64 in any grey scale: the
+    intensity gain does not change the flow. float64 is computed in float64, everything else in
+    float32. Inputs are never modified.
 
     Parameters
     ----------
     frames : array (T, H, W), or list, tuple or iterator of arrays (H, W)
-        Oldest first, one size, at least 3 x 3 px (`coarse_to_fine` finds nothing in frames less than 5 px wide or high).
-    method : "coarse_to_fine", "windowed", "instantaneous", "lucas_kanade" or "horn_schunck"
-        "coarse_to_fine" (default): the transported equations with a pyramid, warping and robust coupling of neighbours, for motions of many pixels, edges and
-        untextured areas; its deviations hold on made scenes and are too small on many recordings (docs/flow.md). "windowed": least squares of the same equations in one
-        Gaussian window, for texture that moves by a pixel or two. "instantaneous": per pixel, WO2010/098160 (34), for locally quadratic,
-        nearly noise-free images. The others are baselines.
-    preset : "fast", "balanced" or "accurate"
-        Cost against error of "coarse_to_fine"; default "balanced". "fast" finds the motion at half the resolution and loses detail of a few px;
-        "accurate" iterates more. `benchmarks/compare.py --only flow recordings` measures time and error of each.
-    levels : int
-        Pyramid levels of "coarse_to_fine"; default as many as the frame allows.
-    model : "affine", "translational" or "accelerating"
-        Motion model of "instantaneous".
-    time_scheme : "forward", "central", "backward" or "pair"
-        How time derivatives are taken, and so to which frame the field belongs: the middle one of three, the newest of three ("backward", "windowed" and
-        "instantaneous" only), or the first of two ("pair", the default for two frames; not "instantaneous"). "forward", the default of "coarse_to_fine"
-        and only known there, tells where the middle frame's pixels are in the next frame, as a pair does; the frame before helps as far as motion goes on as
-        it was. "central", the default of the others, is the mean of the steps before and after: the velocity at the middle frame.
-    neighbourhood : (columns, rows) or array (N, 2) of offsets (x, y), px
-        Pixels that the local quadratic is fitted to; default 3 x 3.
-    neighbourhood_sigma : float, px
-        Weighs them by a Gaussian; default equal weights.
-    window_sigma : float, px
-        Standard deviation of the window of "windowed" and "lucas_kanade"; default 4.
-    rows : "brightness", "gradient", "jet" or "all"
-        Equations that "windowed" sums: 1, 3, 6 or 12 at each pixel; default "all", for pairs "gradient".
-    smoothness : float, in units of the root mean square gradient of the frame
-        Weight of "horn_schunck", so that the intensity gain does not change the flow; default 1.
-    iterations : int
-        Most iterations of "horn_schunck".
-    rank_deficient : "nan" or "min_norm"
-        What "windowed" and "instantaneous" report where the equations do not determine every unknown.
-    smooth : float, px
-        Standard deviation of a Gaussian that smooths each frame first, 0 for none; default 1.5 for "windowed", none for the others.
-    quantise : float, grey levels
-        Rounds samples down to multiples of it before smoothing; default none.
-    colour : "error" (default) or "luminance"
-        What to do with frames (H, W, 3 or 4).
-    points : array (N, 2) of int, px
-        Pixels (x, y) to estimate at, nothing else is computed; arrays of the result are (..., N) instead of (..., H, W).
-    region : (x, y, width, height), px
-        Rectangle to estimate in.
-    stride : int, px
-        Estimate at every stride-th column and row.
-    mask : bool array (H, W)
-        True where pixels may be used.
-    fps, frame_period : float, frames/s or s
-        For quantities per second; give one of them.
-    pixel_pitch : float or (dx, dy), any length unit
-        Size of a pixel; flow then comes in that unit per frame.
+        Oldest first, one size, at least 3 x 3 px (`coarse_to_fine` finds nothing in frames less than
+        5 px wide or high).
+    method : "coarse_to_fine", "windowed", "instantaneous", "lucas_kanade", "horn_schunck", or options
+        A name means the method with its defaults; `CoarseToFine` (default), `Windowed`,
+        `Instantaneous`, `LucasKanade` and `HornSchunck` hold its options and say what it is for.
+    temporal : "none" (default), "recursive", or `Recursive`
+        "recursive" fuses the estimates of all frames so far, for motion that is steady in the picture
+        ("coarse_to_fine", "windowed", "instantaneous").
     covariance : bool
-        Whether to compute the covariance of the parameters; default yes, where the method has one (not "horn_schunck").
-    diagnostics : bool
-        Whether to report residual, rank and condition number, and the windows that "coarse_to_fine" chose.
+        Whether to compute the covariance of the parameters; default yes, where the method has one
+        (not "horn_schunck").
     noise : float, grey levels
         Standard deviation of the pixel noise for the covariance; default from the frames.
-    temporal : "none" or "recursive"
-        "recursive" fuses the estimates of all frames so far, for motion that is steady in the picture ("windowed", "coarse_to_fine", "instantaneous"): an information filter on
-        (u, v, u_x, v_x, u_y, v_y) at each fixed pixel, `P_k^-1 = f P_{k-1}^-1 + C_k^-1`, `x_k = x_{k-1} + P_k C_k^-1 (m_k - x_{k-1})` with the estimate m_k of each time, its covariance C_k and f = `forgetting`.
-        It starts with the first estimate; noise falls with the number of frames, systematic error does not, and the covariance says both. Where the motion changes a pixel starts anew (normalised
-        innovation squared above 27.86) or shortens its memory. Times without an estimate get the prediction and status PREDICTED. Needs the covariance; default "none".
-    forgetting : float, no unit
-        Factor f of "recursive", above 0 and at most 1: the memory is 1 / (1 - f) frames; default 0.95.
+    diagnostics : bool
+        Whether to report residual, rank and condition number, and the windows that "coarse_to_fine"
+        chose.
+    grid : `SamplingGrid`
+        Region and stride, or single points; default every pixel.
+    mask : bool array (H, W)
+        True where pixels may be used.
+    preprocess : `Preprocess`
+        Quantising, smoothing and conversion of colour, before anything else.
+    fps : float, frames/s
+        For quantities per second.
+    pixel_pitch : float or (dx, dy), any length unit
+        Size of a pixel; flow then comes in that unit per frame.
     precision : "float32" or "float64"
         Default: that of the frames.
     threads : int
-        Default: environment variable JACOFLOW_THREADS, else every processor. Results do not depend on it.
+        Default: environment variable JACOFLOW_THREADS, else every processor. Results do not depend on
+        it.
     simd : "scalar", "avx2" or "avx512"
         Default: environment variable JACOFLOW_SIMD, else the best of the processor.
     progress : None, True or function (done, total)
-        True draws a line on standard error; a function is called after each frame. Ctrl-C stops between frames.
+        True draws a line on standard error; a function is called after each frame. Ctrl-C stops
+        between frames.
 
     Raises
     ------
     ValueError
-        For fewer frames than the method needs, frames under 3 x 3 px or of different sizes, colour, and options out of range; each message names the argument.
+        For fewer frames than the method needs, frames under 3 x 3 px or of different sizes, colour,
+        and options out of range; each message names the argument.
     TypeError
         For another dtype.
     """
@@ -453,45 +436,30 @@ def estimate(
 class FlowEstimator:
     """Flow from a stream: frames are pushed one by one, memory stays bounded.
 
-    The options are those of `estimate`; see there for what they mean and their units. A field (H, W) comes as soon as three frames have
-    (two with time_scheme="pair"). With temporal="recursive" each field holds what all frames so far tell. Pickles in mid-stream.
+    The options are those of `estimate`; see there for what they mean and their units. A field (H, W) comes as
+    soon as three frames have (two with the time scheme "pair"). With temporal="recursive" each field is
+    estimated from all frames so far. Pickles in mid-stream.
     """
     def __new__(
         cls,
         *,
-        method: _Method = "coarse_to_fine",
-        preset: _Preset | None = None,
-        levels: int | None = None,
-        model: _Model = "affine",
-        time_scheme: _Scheme | None = None,
-        neighbourhood: tuple[int, int] | ArrayLike | None = None,
-        neighbourhood_sigma: float | None = None,
-        window_sigma: float | None = None,
-        rows: _Rows | None = None,
-        smoothness: float | None = None,
-        iterations: int | None = None,
-        rank_deficient: _Rank = "nan",
-        smooth: float | None = None,
-        quantise: float | None = None,
-        colour: _Colour | None = None,
-        points: ArrayLike | None = None,
-        region: _Rectangle | None = None,
-        stride: int | None = None,
-        mask: NDArray[np.bool_] | None = None,
-        fps: float | None = None,
-        frame_period: float | None = None,
-        pixel_pitch: float | tuple[float, float] | None = None,
+        method: FlowMethod | None = None,
+        temporal: Fusion | None = None,
         covariance: bool | None = None,
-        diagnostics: bool = False,
         noise: float | None = None,
-        temporal: _Temporal | None = None,
-        forgetting: float | None = None,
+        diagnostics: bool = False,
+        grid: SamplingGrid | None = None,
+        mask: NDArray[np.bool_] | None = None,
+        preprocess: Preprocess | None = None,
+        fps: float | None = None,
+        pixel_pitch: float | tuple[float, float] | None = None,
         precision: _Precision | None = None,
         threads: int | None = None,
         simd: _Simd | None = None,
     ) -> FlowEstimator: ...
     def push(self, /, frame: _Frame) -> FlowField | None:
-        """Takes the next frame (H, W), in any grey unit; returns a FlowField (px/frame) once enough frames have come, before that None.
+        """Takes the next frame (H, W), in any grey unit; returns a FlowField (px/frame) once enough frames have
+        come, before that None.
 
         A frame that raises an error (ValueError for another size, TypeError for another dtype) is not kept.
         """
@@ -512,42 +480,21 @@ class FlowEstimator:
 class FlowFilter:
     """Flow and Jacobian filtered in time: one small Kalman filter at each site, WO2010/098160 (44)-(55).
 
-    Frames are pushed one by one; each gives a FlowField in px/frame and 1/frame. States are ordered q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x,
-    v_x, u_y, v_y) in 8-bit grey levels, px and frames. `profile` "patent" has the patent's constants, "measured" those for raw 8-bit
-    frames (9 x 9 pixels); the other options replace single constants. Pickles in mid-stream.
-
-    `form` "fast" (13 sigma points) has the numbers of "non_augmented" (25) with `square_root="motion_first"`, not those of its default
-    "brightness_first", which is filterpy's order. With the profile "measured" they follow the patent's ramp equally well (rms error of u within
-    0.3 %); with "patent" use "augmented" or "non_augmented": the rms error of u is 0.063 px/frame there and 0.30 px/frame with "fast".
+    Frames are pushed one by one; each gives a FlowField in px/frame and 1/frame. States are ordered q = (I,
+    Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y) in 8-bit grey levels, px and frames. `profile` "patent"
+    has the patent's constants, "measured" those for raw 8-bit frames (9 x 9 pixels); a `FilterProfile`
+    replaces single ones. The other options are those of `estimate`. Pickles in mid-stream.
     """
     def __new__(
         cls,
         *,
-        profile: Literal["patent", "measured"] = "patent",
-        form: Literal["augmented", "non_augmented", "fast", "extended"] | None = None,
-        transition: Literal["rk4", "exact"] | None = None,
-        square_root: Literal["brightness_first", "motion_first"] | None = None,
-        neighbourhood: tuple[int, int] | ArrayLike | None = None,
-        neighbourhood_sigma: float | None = None,
-        Q: ArrayLike | None = None,
-        R: float | None = None,
-        x0: ArrayLike | None = None,
-        P0: ArrayLike | None = None,
-        alpha: float | None = None,
-        beta: float | None = None,
-        kappa: float | None = None,
-        full_scale: float | None = None,
-        smooth: float | None = None,
-        quantise: float | None = None,
-        colour: _Colour | None = None,
-        points: ArrayLike | None = None,
-        region: _Rectangle | None = None,
-        stride: int | None = None,
-        mask: NDArray[np.bool_] | None = None,
-        fps: float | None = None,
-        frame_period: float | None = None,
-        pixel_pitch: float | tuple[float, float] | None = None,
+        profile: Literal["patent", "measured"] | FilterProfile | None = None,
         covariance: bool = True,
+        grid: SamplingGrid | None = None,
+        mask: NDArray[np.bool_] | None = None,
+        preprocess: Preprocess | None = None,
+        fps: float | None = None,
+        pixel_pitch: float | tuple[float, float] | None = None,
         precision: _Precision | None = None,
         threads: int | None = None,
         simd: _Simd | None = None,
@@ -555,38 +502,44 @@ class FlowFilter:
     def push(self, /, frame: _Frame) -> FlowField:
         """Takes in the next frame (H, W) and returns the FlowField after it, px/frame.
 
-        Where a neighbourhood holds NaN the filter only predicts, and the result is NaN with status NON_FINITE. ValueError for a frame of another
-        size, TypeError for another dtype; the filter is then unchanged.
+        Where a neighbourhood holds NaN the filter only predicts, and the result is NaN with status
+        NON_FINITE. ValueError for a frame of another size, TypeError for another dtype; the filter is then
+        unchanged.
         """
     def reset(self, /) -> None:
         """Forgets every frame (H, W): the next one starts new filters."""
     @property
     def state(self) -> NDArray[np.float64] | None:
-        """Means q of the filters, float64 array (H, W, 12) or (N, 12), in 8-bit grey levels, px and frames; NaN where there is no filter (border, mask).
+        """Means q of the filters, float64 array (H, W, 12) or (N, 12), in 8-bit grey levels, px and frames; NaN
+        where there is no filter (border, mask).
 
         None before the first frame.
         """
     @property
     def state_covariance(self) -> NDArray[np.float64] | None:
-        """Covariances of q, float64 array (H, W, 12, 12) or (N, 12, 12), units of `state` squared; NaN where there is no filter. None before the first frame."""
+        """Covariances of q, float64 array (H, W, 12, 12) or (N, 12, 12), units of `state` squared; NaN where
+        there is no filter. None before the first frame."""
     @property
     def frames_pushed(self) -> int:
         """How many frames have been taken in (a count, no unit)."""
     @property
     def repairs(self) -> int:
-        """How often a site's covariance had lost its positive definiteness and was mended (a count, no unit)."""
+        """How often a site's covariance had lost its positive definiteness and was repaired (a count, no unit)."""
     @property
     def options(self) -> dict[str, Any]:
         """The options as a dictionary, in the units of the constructor."""
     def save(self, /, path: _Path) -> None:
         """Writes the states (one file, .npz) so that `load` goes on bit for bit, in the units of `state`.
 
-        Pickling keeps the options too. ValueError before the first frame, OSError when the file cannot be written.
+        Pickling keeps the options too. ValueError before the first frame, OSError when the file cannot be
+        written.
         """
     def load(self, /, path: _Path) -> None:
-        """Takes up the states that `save` wrote, in the units of `state`; the options of this filter must be those of the saved one.
+        """Takes up the states that `save` wrote, in the units of `state`; the options of this filter must be
+        those of the saved one.
 
-        FormatError for a damaged file, ValueError for a file of other options or another precision, OSError when it cannot be read.
+        FormatError for a damaged file, ValueError for a file of other options or another precision, OSError
+        when it cannot be read.
         """
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
@@ -594,12 +547,13 @@ def quantities() -> dict[str, tuple[str, str]]:
     """Derived quantities with their units (per frame, with a frame period), as a dictionary."""
 
 def smooth(
-    frame: _Frame, sigma: float, *, truncate: float | None = None, threads: int | None = None
+    frame: _Frame, blur_sigma: float, *, truncate: float | None = None, threads: int | None = None
 ) -> _Floats:
-    """`frame` (H, W) smoothed by a Gaussian of standard deviation `sigma` px, cut off at `truncate` standard deviations, reflecting borders.
+    """`frame` (H, W) smoothed by a Gaussian of standard deviation `blur_sigma` px, cut off at `truncate`
+    standard deviations, reflecting borders.
 
-    Returns a new array (H, W) in the same grey levels, float64 for float64, else float32. NaN damages only the pixels whose kernel reaches
-    it. ValueError for a negative or infinite `sigma`.
+    Returns a new array (H, W) in the same grey levels, float64 for float64, else float32. NaN damages only
+    the pixels whose kernel reaches it. ValueError for a negative or infinite `blur_sigma`.
     """
 
 def quantise(frame: _Frame, step: float | None = None) -> _Floats:
@@ -609,9 +563,11 @@ def quantise(frame: _Frame, step: float | None = None) -> _Floats:
     """
 
 def luminance(frame: _Frame) -> NDArray[Any]:
-    """Luma 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601) of a colour frame (H, W, 3 or 4) in the order red, green, blue; alpha is left out.
+    """Luma 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601) of a colour frame (H, W, 3 or 4) in the order red, green,
+    blue; alpha is left out.
 
-    Returns a new array (H, W) of the same dtype and grey levels; integers are rounded. A grey frame (H, W) is copied.
+    Returns a new array (H, W) of the same dtype and grey levels; integers are rounded. A grey frame (H, W) is
+    copied.
     """
 
 def corners(
@@ -655,8 +611,8 @@ def point_flow(
 
     B. Lucas, T. Kanade, 1981; J.-Y. Bouguet, "Pyramidal implementation of the Lucas Kanade feature tracker",
     2000. Minimises the squared differences in a window of `window` x `window` px (odd), on `levels` levels
-    (1: full size alone). A level takes at most `max_steps` steps and ends with one shorter than `min_step` px.
-    `guesses` (N, 2): expected flow, default zero.
+    (1: full size alone). A level takes at most `max_steps` steps and ends with one shorter than `min_step`
+    px. `guesses` (N, 2): expected flow, default zero.
 
     `ok` is False unless the flow back from the new position leads to within `forward_backward` px of the
     point (None: not tested). A point is lost (NaN) when it leaves the frame, when its window touches NaN, or
@@ -673,10 +629,11 @@ def point_flow(
 class GaussianFilter:
     """Mean, covariance and noise of a batch of filters, as float64 arrays.
 
-    Without `batch` arrays have no leading axis: x (n,), P (n, n), y (m,), S (m, m), K (n, m). With `batch=B` they are
-    (B, n), (B, n, n) and so on; Q and R may be shared by the whole batch. Arrays may be replaced or changed in place; a number given
-    for P, Q or R means that multiple of the identity. ValueError for an x that is not finite and for a P, Q or R that is not finite, symmetric
-    and positive semi-definite, when it is set or, changed in place, at the next step. Units are the state's and the measurement's own.
+    Without `batch` arrays have no leading axis: x (n,), P (n, n), y (m,), S (m, m), K (n, m). With `batch=B`
+    they are (B, n), (B, n, n) and so on; Q and R may be shared by the whole batch. Arrays may be replaced or
+    changed in place; a number given for P, Q or R means that multiple of the identity. ValueError for an x
+    that is not finite and for a P, Q or R that is not finite, symmetric and positive semi-definite, when it
+    is set or, changed in place, at the next step. Units are the state's and the measurement's own.
     """
     @property
     def x(self) -> NDArray[np.float64]:
@@ -700,7 +657,8 @@ class GaussianFilter:
     def R(self, value: ArrayLike, /) -> None: ...
     @property
     def y(self) -> NDArray[np.float64]:
-        """Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where the measurement was missing."""
+        """Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where the
+        measurement was missing."""
     @property
     def S(self) -> NDArray[np.float64]:
         """Covariance of the residual, array (m, m) or (B, m, m), in the measurement's units squared."""
@@ -712,7 +670,7 @@ class GaussianFilter:
         """Logarithm of the last measurement's likelihood, array () or (B,), no unit."""
     @property
     def repairs(self) -> int:
-        """How often a covariance had lost its positive definiteness and was mended (a count, no unit)."""
+        """How often a covariance had lost its positive definiteness and was repaired (a count, no unit)."""
     @property
     def dim_x(self) -> int:
         """Dimensions n of the state (a count, no unit)."""
@@ -727,7 +685,8 @@ class GaussianFilter:
 class KalmanFilter(GaussianFilter):
     """Linear Kalman filter x' = F x + w, z = H x + v with w ~ N(0, Q), v ~ N(0, R).
 
-    `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a leading axis (B, ...).
+    `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a
+    leading axis (B, ...).
     """
     def __new__(cls, dim_x: int, dim_z: int, *, batch: int | None = None) -> KalmanFilter: ...
     @property
@@ -743,9 +702,11 @@ class KalmanFilter(GaussianFilter):
     def predict(self, /, *, F: ArrayLike | None = None, Q: ArrayLike | None = None) -> None:
         """x <- F x, P <- F P F^T + Q. `F` (n, n) or (B, n, n) and `Q` replace the attributes for this step."""
     def update(self, /, z: ArrayLike | None, R: ArrayLike | None = None, H: ArrayLike | None = None) -> None:
-        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing one.
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
+        one.
 
-        `R` and `H` replace the attributes for this step. NumericalError when the innovation covariance is not positive definite.
+        `R` and `H` replace the attributes for this step. NumericalError when the innovation covariance is not
+        positive definite.
         """
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
@@ -753,23 +714,26 @@ class KalmanFilter(GaussianFilter):
 class ExtendedKalmanFilter(GaussianFilter):
     """Extended Kalman filter x' = f(x) + w, z = h(x) + v, linearised at the mean.
 
-    `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a leading axis (B, ...).
-    Functions are vectorised over leading axes: `fx` and `Hx` map (..., n) to (..., n) and (..., m); `FJacobian` and `HJacobian` map the means
-    (n,) or (B, n) to (n, n) or (B, n, n) and (m, n) or (B, m, n). Without a Jacobian central differences are taken.
+    `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a
+    leading axis (B, ...). Functions are vectorised over leading axes: `fx` and `Hx` map (..., n) to (..., n)
+    and (..., m); `FJacobian` and `HJacobian` map the means (n,) or (B, n) to (n, n) or (B, n, n) and (m, n)
+    or (B, m, n). Without a Jacobian central differences are taken.
     """
     def __new__(cls, dim_x: int, dim_z: int, *, batch: int | None = None) -> ExtendedKalmanFilter: ...
     def predict(self, /, fx: _Callback, FJacobian: _Callback | None = None) -> None:
-        """x <- fx(x), P <- F P F^T + Q with F = `FJacobian(x)`, arrays (n,) and (n, n) or with a leading (B, ...), in the state's units.
+        """x <- fx(x), P <- F P F^T + Q with F = `FJacobian(x)`, arrays (n,) and (n, n) or with a leading (B,
+        ...), in the state's units.
 
         Exceptions of the functions leave x and P as they were.
         """
     def update(
         self, /, z: ArrayLike | None, HJacobian: _Callback | None, Hx: _Callback, R: ArrayLike | None = None
     ) -> None:
-        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing one.
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
+        one.
 
-        `HJacobian` None takes central differences of `Hx`. `R` replaces the attribute for this step. Exceptions of the functions leave x
-        and P as they were.
+        `HJacobian` None takes central differences of `Hx`. `R` replaces the attribute for this step.
+        Exceptions of the functions leave x and P as they were.
         """
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
@@ -777,8 +741,8 @@ class ExtendedKalmanFilter(GaussianFilter):
 class MerweScaledSigmaPoints:
     """Scaled sigma points (van der Merwe 2004): 2 n + 1 points with mean and covariance of the state.
 
-    `n` dimensions; spread `alpha` (no unit), `beta` 2 for Gaussians, `kappa` secondary spread. The squared spread of the points is
-    alpha^2 (n + kappa).
+    `n` dimensions; spread `alpha` (no unit), `beta` 2 for Gaussians, `kappa` secondary spread. The squared
+    spread of the points is alpha^2 (n + kappa).
     """
     def __new__(
         cls, n: int, alpha: float | None = None, beta: float | None = None, kappa: float | None = None
@@ -973,11 +937,12 @@ def resample(
 class UnscentedKalmanFilter(GaussianFilter):
     """Unscented Kalman filter x' = f(x) + w, z = h(x) + v (Julier and Uhlmann 1997, van der Merwe 2004).
 
-    `fx(points, dt)` and `hx(points)` are vectorised: they receive every sigma point in one array (2 n + 1, n), or (B, 2 n + 1, n) with
-    `batch=B`, and return (..., n) and (..., m). `dt` is handed to `fx` as it is, in whatever unit `fx` wants. `points` is a
-    MerweScaledSigmaPoints. With `augmented=True` the noise is part of the sigma points, `fx(points, noise, dt)` with 4 n + 1 rows each.
-    With `redraw=True` new points are drawn for the measurement; False measures the propagated ones, as filterpy 1 did, which leaves Q out of
-    the innovation covariance.
+    `fx(points, dt)` and `hx(points)` are vectorised: they receive every sigma point in one array (2 n + 1,
+    n), or (B, 2 n + 1, n) with `batch=B`, and return (..., n) and (..., m). `dt` is handed to `fx` as it is,
+    in the unit that `fx` expects. `points` is a MerweScaledSigmaPoints. With `augmented=True` the noise is
+    part of the sigma points, `fx(points, noise, dt)` with 4 n + 1 rows each. With `redraw=True` new points
+    are drawn for the measurement; False measures the propagated ones, as filterpy 1 did, which leaves Q out
+    of the innovation covariance.
     """
     def __new__(
         cls,
@@ -1007,7 +972,7 @@ class UnscentedKalmanFilter(GaussianFilter):
         """The sigma points in use (constants have no unit)."""
     @property
     def dt(self) -> float:
-        """Step handed to `fx`, in whatever unit it wants."""
+        """Step handed to `fx`, in the unit that it expects."""
     @property
     def augmented(self) -> bool:
         """Whether the noise is part of the sigma points (no unit)."""
@@ -1015,16 +980,20 @@ class UnscentedKalmanFilter(GaussianFilter):
     def redraw(self) -> bool:
         """Whether new points are drawn for the measurement (no unit)."""
     def predict(self, /, dt: float | None = None, fx: _Callback | None = None, **fx_args: Any) -> None:
-        """Propagates mean and covariance through `fx` by `dt` (default: that of the constructor, same unit); keywords are handed to `fx`.
+        """Propagates mean and covariance through `fx` by `dt` (default: that of the constructor, same unit);
+        keywords are handed to `fx`.
 
-        Exceptions of `fx` leave x and P (n,), (n, n) as they were. NumericalError when P has no positive-definite repair.
+        Exceptions of `fx` leave x and P (n,), (n, n) as they were. NumericalError when P has no
+        positive-definite repair.
         """
     def update(
         self, /, z: ArrayLike | None, R: ArrayLike | None = None, hx: _Callback | None = None, **hx_args: Any
     ) -> None:
-        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing one.
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
+        one.
 
-        `R` and `hx` replace the attributes for this step, keywords are handed to `hx`. Exceptions of `hx` leave x and P as they were.
+        `R` and `hx` replace the attributes for this step, keywords are handed to `hx`. Exceptions of `hx`
+        leave x and P as they were.
         """
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
@@ -1032,9 +1001,10 @@ class UnscentedKalmanFilter(GaussianFilter):
 class Scene:
     """A moving picture I(x, y, t) with exact flow and Jacobian at every point and time.
 
-    `name` is one of `scenes.names()`; frames have `width` x `height` px, pixel (0, 0) lies at the scene point `origin` (x, y) px; `random_state`
-    makes everything random; `carrier` (one of `scenes.carriers()`) is what the motion moves; `parameters` are those of
-    `scenes.parameters(name)`, each in the unit told there. Time t is in frames, brightness in grey levels of an 8-bit scale.
+    `name` is one of `scenes.names()`; frames have `width` x `height` px, pixel (0, 0) lies at the scene point
+    `origin` (x, y) px; `random_state` makes everything random; `carrier` (one of `scenes.carriers()`) is what
+    the motion moves; `parameters` are those of `scenes.parameters(name)`, each in the unit given there. Time
+    t is in frames, brightness in grey levels of an 8-bit scale.
     """
     def __new__(
         cls,
@@ -1057,20 +1027,27 @@ class Scene:
     def origin(self) -> tuple[float, float]:
         """Scene point (x, y) of pixel (0, 0), px."""
     def frame(self, /, t: float) -> NDArray[np.float64]:
-        """The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded nor clipped."""
+        """The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded
+        nor clipped.
+        """
     def frames(self, /, count: int, start: float = 0.0) -> NDArray[np.float64]:
         """Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit scale."""
     def truth(self, /, t: float, *, between: tuple[float, float] | None = None) -> FlowField:
         """Exact flow and Jacobian of the frame of time `t` (frames), a FlowField (H, W) in px/frame and 1/frame.
 
-        Without `between` the velocity at that time. With `between=(a, b)`, frames, the mean velocity between the times t + a and t + b of the matter that is at each
-        pixel at time t, `(d(b) - d(a)) / (b - a)` for displacements d since t: what frames can tell, where paths are curved. (0, 1) is the displacement to
-        the next frame, (-1, 1) the mean of those since the last and to the next. Status MASKED and NaN where the scene has no single truth.
+        Without `between` the velocity at that time. With `between=(a, b)`, frames, the mean velocity between
+        the times t + a and t + b of the matter that is at each pixel at time t, `(d(b) - d(a)) / (b - a)` for
+        displacements d since t: what frames can show, where paths are curved. (0, 1) is the displacement to
+        the next frame, (-1, 1) the mean of those since the last and to the next. Status MASKED and NaN where
+        the scene has no single truth.
         """
     def motion(self, /, x: float, y: float, t: float) -> NDArray[np.float64] | None:
-        """Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame, array (6,); None without truth."""
+        """Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame,
+        array (6,); None without truth.
+        """
     def displacement(self, /, x: float, y: float, t: float, duration: float = 1.0) -> tuple[float, float] | None:
-        """How far (x, y) px the matter at scene point (x, y) px and time t has gone `duration` frames later; None where the scene does not know.
+        """How far (x, y) px the matter at scene point (x, y) px and time t has gone `duration` frames later;
+        None where the scene does not know.
 
         It differs from `duration` times the velocity wherever paths are curved.
         """
@@ -1083,11 +1060,12 @@ class TargetScene:
     """A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with
     exact boxes.
 
-    `name` is one of `scenes.target_scenes()`. `random_state` chooses the recording: world, texture, gait, shake and
-    noise. `scale` multiplies all lengths; at 1 a frame has 720 x 480 px. `noise` is the standard deviation of
-    the white noise of each channel, grey levels. `frames` is their number, by default that of the scene; zoom
-    and sizes reach their last value in the last frame. `colour_cast` r, 0 to 1, grows to the last frame: red
-    is multiplied by 1 - r, blue by 1 + r / 2. ValueError for an unknown name or an unusable option.
+    `name` is one of `scenes.target_scenes()`. `random_state` chooses the recording: world, texture, gait,
+    shake and noise. `scale` multiplies all lengths; at 1 a frame has 720 x 480 px. `noise` is the standard
+    deviation of the white noise of each channel, grey levels. `frames` is their number, by default that of
+    the scene; zoom and sizes reach their last value in the last frame. `colour_cast` r, 0 to 1, grows to the
+    last frame: red is multiplied by 1 - r, blue by 1 + r / 2. ValueError for an unknown name or an unusable
+    option.
     """
     def __new__(
         cls,
@@ -1141,8 +1119,9 @@ class TargetScene:
 class Sensor:
     """What a camera does to a frame: white noise, rounding, clipping.
 
-    `noise` standard deviation in grey levels; `rounding` "none", "floor" (the patent's quantiser) or "nearest"; `saturate` clips to 0 ... 255;
-    `random_state` of the noise. Without arguments it changes nothing.
+    `noise` standard deviation in grey levels; `rounding` "none", "floor" (the patent's quantiser) or
+    "nearest"; `saturate` clips to 0 ... 255; `random_state` of the noise. Without arguments it changes
+    nothing.
     """
     def __new__(
         cls,
@@ -1158,7 +1137,9 @@ class Sensor:
         The noise depends on the seed, `index` (which frame it is) and the pixel, on nothing else.
         """
     def apply_u8(self, /, frame: _Frame, index: int = 0) -> NDArray[np.uint8]:
-        """As `apply`, as a uint8 array (H, W) of grey levels; fractions are cut off and values outside 0 ... 255 clipped."""
+        """As `apply`, as a uint8 array (H, W) of grey levels; fractions are cut off and values outside 0 ... 255
+        clipped.
+        """
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self, /) -> int: ...
     def __getnewargs_ex__(self, /) -> tuple[tuple[()], dict[str, Any]]: ...
@@ -1197,7 +1178,8 @@ class _GaussMarkovFilter:
     def predict(self) -> None:
         """To the next frame."""
     def update(self, position: tuple[list[float], list[float]] | None, velocity: tuple[list[float], list[float]] | None) -> float:
-        """Takes a measurement: values and variances along x and y; returns its normalised innovation squared."""
+        """Takes a measurement: values and variances along x and y; returns its normalised innovation
+        squared."""
     def state(self) -> NDArray[np.float64]:
         """Position, velocity and acceleration along x and along y, (2, 3), px and frames."""
     def save(self) -> dict[str, Any]:
@@ -1246,7 +1228,8 @@ class _StereoTracker:
     def update(self, left: NDArray[Any], right: NDArray[Any], dt: float | None) -> dict[str, Any]:
         """The next step from both views, `dt` after the last one, as a dictionary."""
     def update_disparity(self, left: NDArray[Any], disparity: NDArray[Any], dt: float | None) -> dict[str, Any]:
-        """The next step from the left view and its disparities, NaN where there is none, `dt` after the last one, as a dictionary."""
+        """The next step from the left view and its disparities, NaN where there is none, `dt` after the last
+        one, as a dictionary."""
     def row_offset(self) -> float | None:
         """How many rows lower the right view shows a point, where that is known."""
     def graph(self) -> _TrackGraph:
@@ -1277,11 +1260,13 @@ def _detect_moving_target(
 def _mixture_dirichlet_fit(
     points: NDArray[np.float64], weights: NDArray[np.float64] | None, parameters: dict[str, Any], responsibilities: NDArray[np.float64] | None
 ) -> dict[str, Any]:
-    """Dirichlet-process mixture of points (N, D) with weights (N,), from responsibilities (N, K) or seeds, as a dictionary of its attributes."""
+    """Dirichlet-process mixture of points (N, D) with weights (N,), from responsibilities (N, K) or seeds, as
+    a dictionary of its attributes."""
 def _mixture_dirichlet_densities(
     points: NDArray[np.float64], components: dict[str, Any], threads: int | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Log densities (N,) of points (N, D) under a mixture that `_mixture_dirichlet_fit` returned, and responsibilities (N, K)."""
+    """Log densities (N,) of points (N, D) under a mixture that `_mixture_dirichlet_fit` returned, and
+    responsibilities (N, K)."""
 def _mixture_fit(
     points: NDArray[np.float64],
     weights: NDArray[np.float64] | None,
@@ -1327,9 +1312,7 @@ def _observability(
     time_scheme: Literal["central", "backward"] | None = None,
     neighbourhood: tuple[int, int] | ArrayLike | None = None,
     neighbourhood_sigma: float | None = None,
-    smooth: float | None = None,
-    quantise: float | None = None,
-    colour: _Colour | None = None,
+    preprocess: Preprocess | None = None,
     threads: int | None = None,
 ) -> dict[str, NDArray[Any]]: ...
 def _felzenszwalb(image: ArrayLike, scale: float, sigma: float, min_size: int, threads: int | None) -> NDArray[np.int32]: ...
@@ -1345,8 +1328,8 @@ def _open_frames(
     spec: _Path,
     colour: Literal["error", "luminance", "rgb"] | None,
     grey: Literal["error", "repeat"] | None,
-    first: int,
-    limit: int | None,
+    start: int,
+    stop: int | None,
     step: int,
 ) -> FrameReader: ...
 def _read_disparity(path: _Path) -> NDArray[np.float32]: ...

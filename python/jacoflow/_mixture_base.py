@@ -45,7 +45,8 @@ else:
 
 
 class PointMixture(_Base):
-    """A mixture of Gaussians for weighted points: prediction, scores and checks of points. Subclasses fit, and keep what they fitted in `_state`."""
+    """A mixture of Gaussians for weighted points: prediction, scores and checks of points. Subclasses fit,
+    and keep what they fitted in `_state`."""
 
     _NUMBERS: ClassVar[tuple[str, ...]] = ()
     """Parameters that are numbers, in their units."""
@@ -131,7 +132,8 @@ class PointMixture(_Base):
         return self._log_densities(self._points(X, fitting=False))
 
     def _points(self, X: ArrayLike, *, fitting: bool) -> Array:
-        """Points as the compiled module takes them; of the dimension that was fitted unless they are to be `fitting`."""
+        """Points as the compiled module takes them; of the dimension that was fitted unless they are to be
+        `fitting`."""
         self._remember_names(X, fitting)
         points = _reals("X", X)
         if points.ndim != 2:
@@ -147,7 +149,8 @@ class PointMixture(_Base):
         return points
 
     def _remember_names(self, X: ArrayLike, fitting: bool) -> None:
-        """Names of the columns of a data frame, `feature_names_in_` (D,), which later ones must have as well: scikit-learn's own rules, where that is installed."""
+        """Names of the columns of a data frame, `feature_names_in_` (D,), which later ones must have as well:
+        scikit-learn's own rules, where that is installed."""
         if _Base is not _Parameters:
             from sklearn.utils import validation  # type: ignore[import-untyped, unused-ignore]
 
@@ -160,7 +163,8 @@ def _names(kind: type) -> list[str]:
 
 
 def _warn_of(y: object, sample_weight: ArrayLike | None) -> None:
-    """Says that `y` is not looked at, where it may have been meant for weights: of fractions, which no labels are, none of them negative. Labels pass in silence, as pipelines hand them to everybody."""
+    """Says that `y` is not looked at, where it may have been meant for weights: of fractions, which no labels
+    are, none of them negative. Labels pass in silence, as pipelines hand them to everybody."""
     if y is None or sample_weight is not None:
         return
     given = np.asarray(y)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import _classify, _observability
+from ._options import Preprocess
 
 __all__ = ["Condition", "Observability", "ObservabilityMap", "classify", "observability"]
 
@@ -74,14 +75,13 @@ def observability(
     time_scheme: Literal["central", "backward"] | None = None,
     neighbourhood: tuple[int, int] | ArrayLike | None = None,
     neighbourhood_sigma: float | None = None,
-    smooth: float | None = None,
-    quantise: float | None = None,
-    colour: Literal["error", "luminance"] | None = None,
+    preprocess: Preprocess | None = None,
     threads: int | None = None,
 ) -> ObservabilityMap:
     """Observability of the affine model at every pixel (H, W) of three frames, oldest first (no units).
 
-    Options are those of `jacoflow.estimate`. ValueError unless there are three frames of one size, at least 3 x 3.
+    `neighbourhood` and `time_scheme` are those of `jacoflow.Instantaneous`. ValueError unless there are three
+    frames of one size, at least 3 x 3.
 
     >>> import numpy as np
     >>> flat = np.zeros((3, 8, 8), np.uint8)
@@ -94,16 +94,15 @@ def observability(
             time_scheme=time_scheme,
             neighbourhood=neighbourhood,
             neighbourhood_sigma=neighbourhood_sigma,
-            smooth=smooth,
-            quantise=quantise,
-            colour=colour,
+            preprocess=preprocess,
             threads=threads,
         )
     )
 
 
 def classify(jet: ArrayLike, motion: ArrayLike) -> Observability:
-    """Theorem 1 for one jet (6,) = (I, Ix, Iy, Ixx, Ixy, Iyy), grey levels and px, moving by (6,) = (u, v, u_x, v_x, u_y, v_y), px/frame and 1/frame.
+    """Theorem 1 for one jet (6,) = (I, Ix, Iy, Ixx, Ixy, Iyy), grey levels and px, moving by (6,) = (u, v,
+    u_x, v_x, u_y, v_y), px/frame and 1/frame.
 
     >>> classify([128, 1, 2, 0.3, 0.1, 0.2], [1, 0, 0, 0, 0, 0]).rank
     6

@@ -1,7 +1,9 @@
-"""Filters that know nothing of images: linear, extended and unscented Kalman filters and a particle filter, over a batch of states.
+"""Filters that know nothing of images: linear, extended and unscented Kalman filters and a particle filter,
+over a batch of states.
 
-Names follow filterpy: `x`, `P`, `Q`, `R`, `predict`, `update`. With `batch=B` every array has a leading axis (B, ...), and one call of a vectorised
-callback serves every state and every sigma point. Units are those of the state and the measurement.
+Names follow filterpy: `x`, `P`, `Q`, `R`, `predict`, `update`. With `batch=B` every array has a leading axis
+(B, ...), and one call of a vectorised callback serves every state and every sigma point. Units are those of
+the state and the measurement.
 
 >>> import numpy as np
 >>> from jacoflow.filters import KalmanFilter

@@ -1,7 +1,8 @@
 """Frames in, frames and flow out.
 
-Frames are arrays (H, W), or (H, W, 3) in colour, in the file's dtype and levels; flow is (H, W, 2) in px/frame. Every file is written under a temporary name and renamed when it is
-whole. Files that cannot be opened raise OSError, damaged ones `jacoflow.FormatError`, each with the path.
+Frames are arrays (H, W), or (H, W, 3) in colour, in the file's dtype and levels; flow is (H, W, 2) in
+px/frame. Every file is written under a temporary name and renamed when it is whole. Files that cannot be
+opened raise OSError, damaged ones `jacoflow.FormatError`, each with the path.
 """
 
 import os
@@ -50,18 +51,21 @@ def frames(
     *,
     colour: Literal["error", "luminance", "rgb"] | None = None,
     grey: Literal["error", "repeat"] | None = None,
-    first: int = 0,
-    limit: int | None = None,
+    start: int = 0,
+    stop: int | None = None,
     step: int = 1,
 ) -> FrameReader:
-    """Iterates over the frames of a source, in their own dtype and levels; memory stays bounded for any length.
+    """Iterates over the frames of a source, in their own dtype and levels; memory stays bounded for any
+    length.
 
-    `source`: a folder of PNG, TIFF, BMP, PGM, PPM and JPEG files (natural order), a pattern such as "frames/*.png", one image, a .txt list of images, a
-    .y4m file, "-" (Y4M on standard input), a .npy stack (T, H, W) or (T, H, W, 3), or a video file (needs ffmpeg on the PATH; see also `jacoflow.video`).
-    Frames `first`, `first + step`, ... at most `limit` of them (counts, no unit).
+    `source`: a folder of PNG, TIFF, BMP, PGM, PPM and JPEG files (natural order), a pattern such as
+    "frames/*.png", one image, a .txt list of images, a .y4m file, "-" (Y4M on standard input), a .npy stack
+    (T, H, W) or (T, H, W, 3), or a video file (needs ffmpeg on the PATH; see also `jacoflow.video`). Frames
+    `start`, `start + step`, ... below `stop` (indices, no unit); default all.
 
-    Frames are grey, arrays (H, W); colour is refused unless `colour="luminance"`. With `colour="rgb"` they are arrays (H, W, 3) of red, green and blue;
-    grey is then refused with `FormatError` unless `grey="repeat"`, which takes its level for all three. Y4M is converted by ITU-R BT.601, limited range
+    Frames are grey, arrays (H, W); colour is refused unless `colour="luminance"`. With `colour="rgb"` they
+    are arrays (H, W, 3) of red, green and blue; grey is then refused with `FormatError` unless
+    `grey="repeat"`, which takes its level for all three. Y4M is converted by ITU-R BT.601, limited range
     unless its header says XCOLORRANGE=FULL.
 
     >>> import tempfile, numpy as np
@@ -72,14 +76,14 @@ def frames(
     4
     [(8, 10), (8, 10)]
     """
-    return _open_frames(source, colour, grey, first, limit, step)
+    return _open_frames(source, colour, grey, start, stop, step)
 
 
 def write_frames(path: _Path, frames: Iterable[NDArray[Any]], *, frame_rate: float = 25.0) -> int:
     """Writes frames (H, W), or (H, W, 3) in colour, of one size and dtype, in their levels; returns how many.
 
-    `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16). `frame_rate` in frames/s is noted where the format has
-    room for it.
+    `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16).
+    `frame_rate` in frames/s is noted where the format has room for it.
     """
     return _write_frames(path, frames, frame_rate)
 
@@ -90,7 +94,8 @@ def read_image(
     colour: Literal["error", "luminance", "rgb"] | None = None,
     grey: Literal["error", "repeat"] | None = None,
 ) -> NDArray[Any]:
-    """Reads an image (PNG, TIFF, BMP, PGM, PPM, JPEG) as an array (H, W) of grey levels, or (H, W, 3) with `colour="rgb"`; `colour` and `grey` as in `frames`."""
+    """Reads an image (PNG, TIFF, BMP, PGM, PPM, JPEG) as an array (H, W) of grey levels, or (H, W, 3) with
+    `colour="rgb"`; `colour` and `grey` as in `frames`."""
     return _read_image(path, colour, grey)
 
 
@@ -110,29 +115,33 @@ def read_kitti(path: _Path) -> NDArray[np.float32]:
 
 
 def write_kitti(path: _Path, flow: ArrayLike) -> None:
-    """Writes flow (H, W, 2), px/frame, as a KITTI PNG in steps of 1/64 px; NaN and what the format cannot hold become invalid."""
+    """Writes flow (H, W, 2), px/frame, as a KITTI PNG in steps of 1/64 px; NaN and what the format cannot
+    hold become invalid."""
     _write_flow(path, flow, "kitti")
 
 
 def read_pfm(path: _Path) -> NDArray[np.float32]:
-    """Reads a .pfm file: float32 array (H, W) or (H, W, 3), in whatever unit it was written."""
+    """Reads a .pfm file: float32 array (H, W) or (H, W, 3), in the unit of the file."""
     return _read_pfm(path)
 
 
 def write_pfm(path: _Path, values: ArrayLike) -> None:
-    """Writes an array (H, W) or (H, W, 3), in whatever unit, as float32 .pfm."""
+    """Writes an array (H, W) or (H, W, 3), in any unit, as float32 .pfm."""
     _write_pfm(path, values)
 
 
 def read_disparity(path: _Path) -> NDArray[np.float32]:
-    """Reads disparity: float32 array (H, W), px, NaN where there is none; .npz, .pfm (infinite where there is none) or .png (KITTI, 16 bit)."""
+    """Reads disparity: float32 array (H, W), px, NaN where there is none; .npz, .pfm (infinite where there is
+    none) or .png (KITTI, 16 bit)."""
     return _read_disparity(path)
 
 
 def write_disparity(path: _Path, disparity: ArrayLike) -> int:
-    """Writes disparity (H, W), px, NaN where there is none, by the name's ending; returns how many values the format could not hold.
+    """Writes disparity (H, W), px, NaN where there is none, by the name's ending; returns how many values the
+    format could not hold.
 
-    .npz and .pfm hold all; .png is the KITTI benchmark's, 16 bit in steps of 1/256 px, for disparities above 0 and below 256 px.
+    .npz and .pfm hold all; .png is the KITTI benchmark's, 16 bit in steps of 1/256 px, for disparities above
+    0 and below 256 px.
 
     >>> import tempfile, numpy as np
     >>> from jacoflow import io

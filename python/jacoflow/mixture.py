@@ -1,7 +1,8 @@
 """Mixtures of Gaussians for points with weights: by variational Bayes, and Dirichlet-process mixtures.
 
-scikit-learn's conventions, without needing scikit-learn: `fit`, `predict`, `sample_weight`, `random_state`, fitted attributes with a trailing underscore.
-Arrays are (N, D) of real numbers in any unit; everything is computed in double precision.
+scikit-learn's conventions, without needing scikit-learn: `fit`, `predict`, `sample_weight`, `random_state`,
+fitted attributes with a trailing underscore. Arrays are (N, D) of real numbers in any unit; everything is
+computed in double precision.
 
 >>> import numpy as np
 >>> from jacoflow.mixture import VariationalGaussianMixture
@@ -30,9 +31,11 @@ __all__ = ["DirichletProcessGaussianMixture", "VariationalGaussianMixture"]
 class VariationalGaussianMixture(PointMixture):
     """A mixture of Gaussians in D dimensions, fitted to weighted points by variational Bayes.
 
-    Proportions have a Dirichlet prior, means and precisions Gauss-Wishart priors; components that the points do not need go back to the prior. Source: the stereo paper, equations (6) to (28); C. Bishop, "Pattern Recognition and
-    Machine Learning" (2006), section 10.2. A weight is evidence and not a proportion: a weight of 3 is the point three times, and twice all weights is not the same fit. It is deterministic for a seed, for any number of threads and, from
-    k-means++ seeds, any order of the points.
+    Proportions have a Dirichlet prior, means and precisions Gauss-Wishart priors; components that the points
+    do not need go back to the prior. Source: the stereo paper, equations (6) to (28); C. Bishop, "Pattern
+    Recognition and Machine Learning" (2006), section 10.2. A weight is evidence and not a proportion: a
+    weight of 3 is the point three times, and twice all weights is not the same fit. It is deterministic for a
+    seed, for any number of threads and, from k-means++ seeds, the order of the points.
 
     Parameters
     ----------
@@ -51,15 +54,20 @@ class VariationalGaussianMixture(PointMixture):
     max_iter : int
         Most rounds, each an M step and an E step.
     tol : float or None
-        Rounds end when the lower bound grows by less than this times the sum of the weights; None: exactly `max_iter` rounds.
+        Rounds end when the lower bound grows by less than this times the sum of the weights; None: exactly
+        `max_iter` rounds.
     n_init : int
         Fits from different seeds, of which the one with the greatest lower bound is kept.
     init : "kmeans++" or "random"
-        First responsibilities: clusters of weighted k-means, or random numbers. These are drawn row by row, so that another order of the points, or a point twice in place of one of twice the weight, is another start; from k-means++ it is the same one.
+        First responsibilities: clusters of weighted k-means, or random numbers. These are drawn row by row,
+        so that another order of the points, or a point twice in place of one of twice the weight, is another
+        start; from k-means++ it is the same one.
     prune_weight : float
-        Components with less weight of points than this are left out by `fit` and by the first `partial_fit`; 0: none.
+        Components with less weight of points than this are left out by `fit` and by the first `partial_fit`;
+        0: none.
     warm_start : bool
-        Whether `fit` begins with the components of the last fit, however many were left of them, unless there are more than `n_components`.
+        Whether `fit` begins with the components of the last fit, however many were left of them, unless there
+        are more than `n_components`.
     random_state : int, numpy.random.RandomState, numpy.random.Generator or None
         Seed; None: numpy's global one.
     threads : int or None
@@ -87,8 +95,9 @@ class VariationalGaussianMixture(PointMixture):
     Raises
     ------
     ValueError
-        For parameters out of range, points that are not finite or beyond 1e140, weights that are negative, not finite, all zero or so large that sums of squares overflow; each message names the argument. A spread
-        below about 1e-152 counts as none.
+        For parameters out of range, points that are not finite or beyond 1e140, weights that are negative,
+        not finite, all zero or so large that sums of squares overflow; each message names the argument. A
+        spread below about 1e-152 counts as none.
     """
 
     _NUMBERS = ("weight_concentration_prior", "mean_precision_prior", "prune_weight")
@@ -153,7 +162,9 @@ class VariationalGaussianMixture(PointMixture):
         X : array (N, D)
             Points.
         y : ignored
-            Only there for pipelines, as scikit-learn's conventions want it before the weights: `fit(X, w)` does not weight. A UserWarning says so where a `y` of fractions, none negative, looks like weights and there is no `sample_weight` (no unit).
+            Only there for pipelines, as scikit-learn's conventions want it before the weights: `fit(X, w)`
+            does not weight. A UserWarning says so where a `y` of fractions, none negative, looks like weights
+            and there is no `sample_weight` (no unit).
         sample_weight : array (N,)
             Evidence of each point, not negative; default 1.
         resp : array (N, n_components)
@@ -168,8 +179,9 @@ class VariationalGaussianMixture(PointMixture):
     def partial_fit(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None, forgetting: float = 1.0) -> Self:
         """Adds a batch of points to the mixture; the first batch is a fit.
 
-        Responsibilities of earlier points stay as they were; of them only weights, means and scatters of the components are kept, times `forgetting`. Rounds maximise the lower bound of earlier and new points together.
-        The prior is that of the first batch, and so is the number of components.
+        Responsibilities of earlier points stay as they were; of them only weights, means and scatters of the
+        components are kept, times `forgetting`. Rounds maximise the lower bound of earlier and new points
+        together. The prior is that of the first batch, and so is the number of components.
 
         Parameters
         ----------
@@ -194,7 +206,8 @@ class VariationalGaussianMixture(PointMixture):
     def score_samples(self, X: ArrayLike) -> Array:
         """How well points (N, D) are explained, (N,): `ln sum_k rho_nk` of equation (14), natural logarithm, as scikit-learn returns it.
 
-        Expected logarithms make it less than the log of a density, by the more the fewer points the components have.
+        Expected logarithms make it less than the log of a density, by the more the fewer points the
+        components have.
         """
         return self._densities(X)[0]
 

@@ -1,9 +1,11 @@
 """Pictures of flow fields with matplotlib (an optional part: `pip install "jacoflow[plot]"`).
 
-Every function takes a `FlowField`, or anything with the arrays `flow` (H, W, 2) and `jacobian` (H, W, 2, 2), draws into `axes` (new ones where
-None is given) and returns them. Image coordinates: x right, y down, pixel centres at whole numbers. Unknown (NaN) values are shown in grey or black.
+Every function takes a `FlowField`, or anything with the arrays `flow` (H, W, 2) and `jacobian` (H, W, 2, 2),
+draws into `axes` (new ones where None is given) and returns them. Image coordinates: x right, y down, pixel
+centres at whole numbers. Unknown (NaN) values are shown in grey or black.
 
-`flow_image` and `wheel_image` need numpy only. `disparity`, `clusters` and `track_graph` draw what `jacoflow.stereo` and `jacoflow.track.StereoTracker` find.
+`flow_image` and `wheel_image` need numpy only. `disparity`, `clusters` and `track_graph` draw what
+`jacoflow.stereo` and `jacoflow.track.StereoTracker` find.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ __all__ = [
 ]
 
 _CORNERS = ((15, (255, 0, 0)), (6, (255, 255, 0)), (4, (0, 255, 0)), (11, (0, 255, 255)), (13, (0, 0, 255)), (6, (255, 0, 255)))
-"""How many hues lie between neighbouring corners of the wheel (S. Baker et al., "A database and evaluation methodology for optical flow", 2011)."""
+"""How many hues lie between neighbouring corners of the wheel (S. Baker et al., "A database and evaluation
+methodology for optical flow", 2011)."""
 
 
 class FieldLike(Protocol):
@@ -52,7 +55,8 @@ class FieldLike(Protocol):
 
 
 def flow_image(field: FieldLike, *, max_speed: float | None = None) -> NDArray[np.uint8]:
-    """Colours of a flow, uint8 array (H, W, 3): direction is hue (right red, down yellow), speed is saturation, at rest is white, unknown is black.
+    """Colours of a flow, uint8 array (H, W, 3): direction is hue (right red, down yellow), speed is
+    saturation, at rest is white, unknown is black.
 
     `max_speed` (px/frame) is the speed of full saturation, by default the 99th percentile; faster is darker.
     """
@@ -61,7 +65,8 @@ def flow_image(field: FieldLike, *, max_speed: float | None = None) -> NDArray[n
 
 
 def wheel_image(size: int = 96) -> NDArray[np.uint8]:
-    """The key to `flow_image`, uint8 array (size, size, 3), size in px: the colour at an offset from the middle is that of flow in that direction."""
+    """The key to `flow_image`, uint8 array (size, size, 3), size in px: the colour at an offset from the
+    middle is that of flow in that direction."""
     offsets = (np.arange(size) - (size - 1) / 2) / max(size / 2, 1)
     v, u = np.meshgrid(offsets, offsets, indexing="ij")
     image = _colours(u, v, 1.0)
@@ -70,7 +75,8 @@ def wheel_image(size: int = 96) -> NDArray[np.uint8]:
 
 
 def flow_colour(field: FieldLike, *, axes: Axes | None = None, max_speed: float | None = None, legend: bool = True) -> Axes:
-    """Draws `flow_image` of a flow (H, W, 2) in px/frame; `legend` adds the colour wheel with its full speed in the lower right corner."""
+    """Draws `flow_image` of a flow (H, W, 2) in px/frame; `legend` adds the colour wheel with its full speed
+    in the lower right corner."""
     axes = axes_or_new(axes)
     image = flow_image(field, max_speed=max_speed)
     axes.imshow(image, extent=_extent(field, image.shape[:2]), interpolation="nearest")
@@ -95,8 +101,8 @@ def quiver(
 ) -> Axes:
     """Draws arrows of a flow (H, W, 2), or of points (N, 2), over `frame`, a grey array (H, W), if given.
 
-    One arrow every `step` sites (default: about 24 along the longer side); an arrow is `scale` times the flow long (default: the longest arrows just
-    fit their distance). Px throughout.
+    One arrow every `step` sites (default: about 24 along the longer side); an arrow is `scale` times the flow
+    long (default: the longest arrows just fit their distance). Px throughout.
     """
     axes = axes_or_new(axes)
     flow = np.asarray(field.flow, dtype=float)
@@ -136,10 +142,12 @@ def scalar_map(
     label: str = "",
     unit: str = "",
 ) -> Axes:
-    """Draws any plane (H, W) with a colour bar: blue, white, red about zero when `signed`, else dark to bright from zero.
+    """Draws any plane (H, W) with a colour bar: blue, white, red about zero when `signed`, else dark to
+    bright from zero.
 
-    `limit` (in the values' unit) is the end of the scale, by default the 98th percentile of the absolute values. `field` places the plane in the image when it has a
-    region or stride. `label` and `unit` are words for the title and the bar.
+    `limit` (in the values' unit) is the end of the scale, by default the 98th percentile of the absolute
+    values. `field` places the plane in the image when it has a region or stride. `label` and `unit` are words
+    for the title and the bar.
     """
     values = np.asarray(values, dtype=float)
     if values.ndim != 2:
@@ -158,21 +166,24 @@ def scalar_map(
 
 
 def divergence(field: FieldLike, *, axes: Axes | None = None, limit: float | None = None) -> Axes:
-    """Draws u_x + v_y of a field (H, W), 1/frame: red where the picture expands. `limit` as in `scalar_map`."""
+    """Draws u_x + v_y of a field (H, W), 1/frame: red where the picture expands. `limit` as in
+    `scalar_map`."""
     jacobian = _jacobian(field)
     values = jacobian[..., 0, 0] + jacobian[..., 1, 1]
     return scalar_map(values, axes=axes, field=field, limit=limit, label="divergence", unit="1/frame")
 
 
 def curl(field: FieldLike, *, axes: Axes | None = None, limit: float | None = None) -> Axes:
-    """Draws v_x - u_y of a field (H, W), 1/frame: red where the picture turns clockwise on the screen. `limit` as in `scalar_map`."""
+    """Draws v_x - u_y of a field (H, W), 1/frame: red where the picture turns clockwise on the screen.
+    `limit` as in `scalar_map`."""
     jacobian = _jacobian(field)
     values = jacobian[..., 1, 0] - jacobian[..., 0, 1]
     return scalar_map(values, axes=axes, field=field, limit=limit, label="curl", unit="1/frame")
 
 
 def overview(field: FieldLike, *, frame: NDArray[Any] | None = None, figure: Figure | None = None) -> Figure:
-    """Four panels of a field (H, W): colours, arrows over `frame` (grey array (H, W), optional), divergence and curl (1/frame). Returns the figure."""
+    """Four panels of a field (H, W): colours, arrows over `frame` (grey array (H, W), optional), divergence
+    and curl (1/frame). Returns the figure."""
     if figure is None:
         pyplot = pyplot_or_error()
         figure = pyplot.figure(figsize=(11, 8), layout="constrained")

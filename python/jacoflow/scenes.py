@@ -1,4 +1,5 @@
-"""Moving pictures with exact truth: brightness, flow (px/frame) and Jacobian (1/frame) at every point and time.
+"""Moving pictures with exact truth: brightness, flow (px/frame) and Jacobian (1/frame) at every point and
+time.
 
 >>> from jacoflow import scenes
 >>> scene = scenes.Scene("affine", width=64, height=48, u_x=0.01)
@@ -38,7 +39,8 @@ def carriers() -> dict[str, str]:
 
 
 def parameters(name: str) -> dict[str, tuple[float | None, str]]:
-    """Parameters of the scene or carrier `name`: for each its default (None: taken from the frame) and its meaning with the unit.
+    """Parameters of the scene or carrier `name`: for each its default (None: taken from the frame) and its
+    meaning with the unit.
 
     ValueError for an unknown name.
 

@@ -25,11 +25,13 @@ class Status(IntEnum):
     UNOBSERVABLE = 4
     """The equations do not determine every unknown."""
     MIN_NORM = 5
-    """Unobservable, and the minimum-norm solution was asked for: values are finite but not unique."""
+    """Unobservable, and the minimum-norm solution was requested: values are finite but not unique."""
     REPAIRED = 6
     """A filter lost its positive-definite covariance and was restarted here."""
     PREDICTED = 7
-    """No estimate at this time: what the estimates before say, with a covariance that grows until the next one."""
+    """No estimate at this time: what the estimates before say, with a covariance that grows until the next
+    one."""
     INCONSISTENT = 8
-    """A full estimate that the frames contradict: along it brightness changes by far more than usual. What is seen is hidden in another frame (occlusion), has
-    changed, or moves otherwise; the covariance does not know. Only "coarse_to_fine" tells."""
+    """A full estimate that the frames contradict: along it brightness changes by far more than usual. What is
+    seen is hidden in another frame (occlusion), has
+    changed, or moves differently; the covariance does not know. Only "coarse_to_fine" reports it."""

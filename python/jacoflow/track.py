@@ -1,4 +1,5 @@
-"""Trackers: a moving target followed from frame to frame, with its velocity, size, angle and how far each can be trusted.
+"""Trackers: a moving target followed from frame to frame, with its velocity, size, angle and how far each can
+be trusted.
 
 `GradientTracker` follows one target in grey frames, `ParticleTracker` several that may look alike in colour
 frames, `StereoTracker` everything that moves before two cameras. Grey frames are arrays (H, W), colour frames
@@ -82,11 +83,12 @@ class TrackResult:
     rotation: float
     """Angle turned since the first frame, rad, clockwise on the screen, not wrapped."""
     rotation_observable: bool
-    """Whether the picture tells the rotation; else it is held (no unit)."""
+    """Whether the picture determines the rotation; else it is held (no unit)."""
     visibility: float
     """Share of the target that is seen, 0 to 1, no unit."""
     status: str
-    """"tracking", "occluded", "coasting" (not seen), "out" (beyond the border) or "lost" (not seen for 15 frames)."""
+    """"tracking", "occluded", "coasting" (not seen), "out" (beyond the border) or "lost" (not seen for 15
+    frames)."""
     reason: str
     """Why the status is what it is; empty if there is nothing to be said (no unit)."""
     reacquired: bool
@@ -101,7 +103,8 @@ class TrackResult:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """A target through a sequence: as `TrackResult`, each with a leading axis of T frames; frame 0 is the one the tracker began with. Lengths in px."""
+    """A target through a sequence: as `TrackResult`, each with a leading axis of T frames; frame 0 is the one
+    the tracker began with. Lengths in px."""
 
     results: tuple[TrackResult, ...]
     """One for each of the T frames."""
@@ -121,26 +124,33 @@ class Track:
 class GradientTracker:
     """Follows one target by the gradient equation.
 
-    Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method" (IPSJ). It is deterministic and keeps bounded memory; several targets are several trackers.
-    It holds what it has learnt of the scene, several planes as large as the frame, and cannot be pickled; its results can.
+    Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method"
+    (IPSJ). It is deterministic and keeps bounded memory; several targets are several trackers. It holds what
+    it has learnt of the scene, several planes as large as the frame, and cannot be pickled; its results can.
 
     Parameters
     ----------
     frame : array (H, W) of uint8, uint16, float32 or float64
-        The first frame, at least 16 x 16 px. Brightness is taken on the scale 0 to 255: uint16 is divided by 257 (samples of 10 to 14 bits must be shifted up first), floats are taken for shares of white unless at least half of what is not dark (above 0.1) exceeds 1.5, in this frame or a later one.
+        The first frame, at least 16 x 16 px. Brightness is taken on the scale 0 to 255: uint16 is divided by
+        257 (samples of 10 to 14 bits must be shifted up first), floats are taken for shares of white unless
+        at least half of what is not dark (above 0.1) exceeds 1.5, in this frame or a later one.
     bbox : (x, y, width, height), px
-        The target's box in it, with x = centre - width / 2; sides of at least 3 px and at most twice the frame's; it may reach over the border.
+        The target's box in it, with x = centre - width / 2; sides of at least 3 px and at most twice the
+        frame's; it may reach over the border.
     center : (x, y), px
-        In place of a box: a point on the target; it is found as soon as it moves. With neither, the target is the first thing that moves; until then the status is "lost".
+        In place of a box: a point on the target; it is found as soon as it moves. With neither, the target is
+        the first object that moves; until then the status is "lost".
     model : "similarity" or "affine"
-        What the target's picture does besides moving: turn and grow (default; stretched only where its outline is not explained otherwise), or be stretched as well.
+        How the target's picture deforms: rotation and scale (default; stretching only where its outline needs
+        it), or stretching as well.
     camera : "auto" or "none"
         Whether the camera may move (default) or stands still, which is faster.
 
     Raises
     ------
     ValueError
-        For a first frame that is too small, not two-dimensional or not finite, a box that is too small or wholly outside, and options out of range; each message names the argument.
+        For a first frame that is too small, not two-dimensional or not finite, a box that is too small or
+        wholly outside, and options out of range; each message names the argument.
     TypeError
         For another dtype.
     """
@@ -158,10 +168,12 @@ class GradientTracker:
         self._tracker = _GradientTracker(_frame(frame), box, point, _word("model", model), _word("camera", camera))
 
     def update(self, frame: ArrayLike) -> TrackResult:
-        """The target in the next frame, an array (H, W) as large as the first; a frame with NaN, infinity or samples beyond 1e9 grey levels counts as one in which the target was not seen.
+        """The target in the next frame, an array (H, W) as large as the first; a frame with NaN, infinity or
+        samples beyond 1e9 grey levels counts as one in which the target was not seen.
 
-        So does a frame whose still scene has nothing to do with that of the frame before (far too bright, or noise): nothing is learnt from it. After ten in a row the scene is taken as it is. A constant
-        of more than 64 grey levels that is added to a whole frame is taken off.
+        So does a frame whose still scene has nothing to do with that of the frame before (far too bright, or
+        noise): nothing is learnt from it. After ten in a row the scene is taken as it is. A constant of more
+        than 64 grey levels that is added to a whole frame is taken off.
 
         Raises
         ------
@@ -204,7 +216,7 @@ def _word(name: str, value: Any) -> str:
 
 
 def _whole(name: str, value: Any) -> int:
-    """An integer of any size; what is too large for it the compiled part tells."""
+    """An integer of any size; the compiled part refuses what is too large."""
     try:
         if isinstance(value, _SWITCHES):
             raise TypeError
@@ -244,7 +256,8 @@ def _holds_switches(value: Any) -> bool:
 
 
 def track(frames: Iterable[ArrayLike], bbox: ArrayLike | None = None, **options: Any) -> Track:
-    """Follows a target through frames (T, H, W), or any iterable of frames (H, W), from its box (x, y, width, height), px, in the first.
+    """Follows a target through frames (T, H, W), or any iterable of frames (H, W), from its box (x, y, width,
+    height), px, in the first.
 
     Options are those of `GradientTracker`. The result has T entries.
     """
@@ -267,7 +280,7 @@ def _follow(kind: type[GradientTracker], frames: Iterable[ArrayLike], bbox: Arra
 
 @dataclass(frozen=True, eq=False)
 class MovingTarget:
-    """The first thing that moves; lengths in px."""
+    """The first object that moves; lengths in px."""
 
     box: Array
     """Its box (x, y, width, height) in the second frame, px."""
@@ -276,9 +289,11 @@ class MovingTarget:
 
 
 def detect_moving_target(first: ArrayLike, second: ArrayLike, center: ArrayLike | None = None) -> MovingTarget | None:
-    """Finds what moves between two frames (H, W) of a still scene: the largest thing, or that nearest to `center` (x, y), px; None where nothing moves.
+    """Finds what moves between two frames (H, W) of a still scene: the largest object, or the one nearest to
+    `center` (x, y), px; None where nothing moves.
 
-    Changed pixels differ by more than three deviations of the noise; the displacement, at most 10 px along each axis, is the smallest that explains them nearly best.
+    Changed pixels differ by more than three deviations of the noise; the displacement, at most 10 px along
+    each axis, is the smallest that explains them nearly best.
 
     Raises `ValueError` for frames of different size.
     """
@@ -287,9 +302,11 @@ def detect_moving_target(first: ArrayLike, second: ArrayLike, center: ArrayLike 
 
 
 class GaussMarkovFilter:
-    """Position, velocity and acceleration of a point, each axis by itself; the acceleration is a first-order Gauss-Markov sequence.
+    """Position, velocity and acceleration of a point, each axis by itself; the acceleration is a first-order
+    Gauss-Markov sequence.
 
-    Source: M. Chiba and S. Ozawa, equations (12) to (24): F = [1 1 1/2; 0 1 1; 0 0 alpha], Q = diag(0, 0, q), one frame a step.
+    Source: M. Chiba and S. Ozawa, equations (12) to (24): F = [1 1 1/2; 0 1 1; 0 0 alpha], Q = diag(0, 0, q),
+    one frame a step.
 
     Parameters
     ----------
@@ -302,7 +319,8 @@ class GaussMarkovFilter:
     start : three variances, px and frames
         Of position, velocity and acceleration at first; default (1, 4, 1).
     measures : "mean" or "instant"
-        What is measured as velocity: the mean since the frame before, x' - x''/(2 alpha) (default, what optical flow tells), or the velocity at the frame, as (24) is printed.
+        What is measured as velocity: the mean since the frame before, x' - x''/(2 alpha) (default, what
+        optical flow measures), or the velocity at the frame, as (24) is printed.
 
     Raises
     ------
@@ -344,10 +362,12 @@ class GaussMarkovFilter:
         position_variance: ArrayLike = 1.0,
         velocity_variance: ArrayLike = 0.25,
     ) -> float:
-        """Takes what was measured (16)-(18): a position (x, y), px, a velocity, px/frame, or both, with their variances (one number or one an axis).
+        """Takes what was measured (16)-(18): a position (x, y), px, a velocity, px/frame, or both, with their
+        variances (one number or one an axis).
 
-        Returns the normalised innovation squared, both axes together: chi squared with as many degrees of freedom as numbers were measured.
-        Raises `ValueError` for numbers that are not finite and variances that are not above 0.
+        Returns the normalised innovation squared, both axes together: chi squared with as many degrees of
+        freedom as numbers were measured. Raises `ValueError` for numbers that are not finite and variances
+        that are not above 0.
         """
         return self._filter.update(
             _measured("position", position, position_variance), _measured("velocity", velocity, velocity_variance)

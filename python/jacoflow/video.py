@@ -28,7 +28,8 @@ def frames(
     step: int = 1,
     grey: Literal["luma", "bt601"] | None = "luma",
 ) -> Iterator[NDArray[np.uint8]]:
-    """The frames of a video one by one, as grey uint8 arrays (H, W); memory stays bounded whatever the length, and the file is closed when the loop ends or is left.
+    """The frames of a video one by one, as grey uint8 arrays (H, W); memory stays bounded for any length, and
+    the file is closed when the loop ends or is left.
 
     Parameters
     ----------
@@ -37,8 +38,8 @@ def frames(
     start, stop, step
         Frames `start`, `start + step`, ... before `stop`, counted from 0 in the order they are shown.
     grey
-        "luma": the video's own brightness, stretched to 0..255 (fast). "bt601": 0.299 R + 0.587 G + 0.114 B, rounded.
-        None: colour, arrays (H, W, 3) of red, green, blue.
+        "luma": the video's own brightness, stretched to 0..255 (fast). "bt601": 0.299 R + 0.587 G + 0.114 B,
+        rounded. None: colour, arrays (H, W, 3) of red, green, blue.
 
     Raises
     ------
@@ -59,7 +60,8 @@ def _until_done(video: Video) -> Iterator[NDArray[np.uint8]]:
 
 
 class Video:
-    """A video file, open for reading: a context manager, and an iterable of uint8 arrays (H, W). Parameters as in `frames`.
+    """A video file, open for reading: a context manager, and an iterable of uint8 arrays (H, W). Parameters
+    as in `frames`.
 
     >>> with jacoflow.video.Video("clip.mp4") as video:  # doctest: +SKIP
     ...     print(video.frame_rate, video.size)
@@ -111,7 +113,8 @@ class Video:
 
     @property
     def frame_rate(self) -> float | None:
-        """Frames a second of the file (before `step`); None where the file does not say. The frame period in s is `step / frame_rate`."""
+        """Frames a second of the file (before `step`); None where the file does not say. The frame period in
+        s is `step / frame_rate`."""
         rate = self._stream.average_rate
         return float(rate) if rate else None
 
@@ -127,7 +130,8 @@ class Video:
         return int(count) if count else None
 
     def timed(self) -> Iterator[tuple[float | None, NDArray[np.uint8]]]:
-        """The frames with their time in s since the start of the video (None where the file has none): pairs (time, array (H, W))."""
+        """The frames with their time in s since the start of the video (None where the file has none): pairs
+        (time, array (H, W))."""
         stream = self._stream
         if self._stop is not None and self._stop <= self._start:
             return

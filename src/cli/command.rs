@@ -31,7 +31,7 @@ pub enum Command {
     Egomotion(Box<EgomotionCommand>),
     /// Write a moving scene whose flow and Jacobian are known exactly
     Synth(Box<SynthCommand>),
-    /// Tell what a recording or a result file holds
+    /// Describe a recording or a result file
     Info(InfoCommand),
     /// Make a scene, estimate its flow, draw it and compare with the truth
     Demo(DemoCommand),
@@ -41,15 +41,15 @@ impl Command {
     /// Whether standard output is for one JSON object.
     pub fn json(&self) -> bool {
         match self {
-            Self::Flow(command) => command.tell.json,
-            Self::Filter(command) => command.tell.json,
-            Self::Measure(command) => command.tell.json,
-            Self::Track(command) => command.tell.json,
-            Self::Stereo(command) => command.tell.json,
-            Self::Egomotion(command) => command.tell.json,
-            Self::Synth(command) => command.tell.json,
-            Self::Info(command) => command.tell.json,
-            Self::Demo(command) => command.tell.json,
+            Self::Flow(command) => command.messages.json,
+            Self::Filter(command) => command.messages.json,
+            Self::Measure(command) => command.messages.json,
+            Self::Track(command) => command.messages.json,
+            Self::Stereo(command) => command.messages.json,
+            Self::Egomotion(command) => command.messages.json,
+            Self::Synth(command) => command.messages.json,
+            Self::Info(command) => command.messages.json,
+            Self::Demo(command) => command.messages.json,
         }
     }
 

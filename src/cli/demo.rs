@@ -1,19 +1,21 @@
 //! `jacoflow demo`: the main job on an embedded scene, with the error against its exact truth.
 
-use super::arguments::{ComputeArguments, TellArguments};
+use super::arguments::{ComputeArguments, MessageArguments};
 use super::interrupt::Watch;
 use super::open::compute;
 use super::report::{Report, print};
-use super::run::{Telling, report, run_pipeline};
+use super::run::{ReportContext, report, run_pipeline};
 use crate::error::{Error, Result};
 use crate::flow::windowed::WindowedOptions;
 use crate::flow::{Estimator, EstimatorOptions, Method};
+use crate::image::Preprocess;
 use crate::io::{FieldFormat, MemorySource, open_sink};
 use crate::parallel::Threads;
 use crate::pipeline::{
-    Collect, EstimatorStage, Numbering, OutputPlan, OutputWish, PictureKind, PictureRanges, Pipeline, is_folder,
+    Collect, Numbering, OutputPlan, OutputWish, PictureKind, PictureRanges, Pipeline, Sink, is_folder,
 };
 use crate::synth::{Scene, SceneOptions, Sensor, build, truth};
+use crate::temporal::{FlowStream, StreamPlan};
 use crate::types::{AnyFrame, FlowField};
 use clap::Args;
 use serde_json::json;
@@ -23,7 +25,7 @@ use std::sync::PoisonError;
 
 /// Frames of the scene.
 const FRAMES: usize = 6;
-/// Frames per second that the scene is said to be filmed at.
+/// Frames per second that the scene is taken at.
 const RATE: f64 = 25.0;
 
 /// Options of `demo`.
@@ -43,7 +45,7 @@ pub struct DemoCommand {
     #[command(flatten)]
     pub compute: ComputeArguments,
     #[command(flatten)]
-    pub tell: TellArguments,
+    pub messages: MessageArguments,
 }
 
 /// Error of a field against the truth.
@@ -84,29 +86,27 @@ impl DemoCommand {
         let frames = self.write_frames(&*scene, threads, replace, watch)?;
         let kept = Collect::<f32>::default();
         let fields = kept.handle();
-        let mut pipeline = Pipeline::<f32>::new(Box::new(EstimatorStage::new(estimator)))
-            .with_threads(threads)
+        let description = json!({"method": "windowed", "scene": "vortex"});
+        let stream = FlowStream::new(StreamPlan::new(estimator, Preprocess::default(), None)?)?;
+        let mut pipeline = Pipeline::<f32>::new(Box::new(stream))
             .with_numbering(Numbering { rate: Some(RATE), ..Numbering::default() })
-            .with_sink(Box::new(kept));
-        for sink in
-            plan.sinks(json!({"method": "windowed", "scene": "vortex"}).to_string(), PictureRanges::default())?
-        {
-            pipeline = pipeline.with_sink(sink);
-        }
+            .with_sinks([Box::new(kept) as Box<dyn Sink<f32>>])
+            .with_sinks(plan.sinks(description.to_string(), PictureRanges::default())?);
         let source = Box::new(MemorySource::new(frames)?.with_frame_rate(RATE));
-        let mut telling = Telling { command: "demo", tell: &self.tell, output: Some(&self.output), details: json!({}) };
-        let (summary, failure) = run_pipeline(&mut pipeline, source, &telling, watch);
+        let mut context =
+            ReportContext { command: "demo", messages: &self.messages, output: Some(&self.output), details: json!({}) };
+        let (summary, failure) = run_pipeline(&mut pipeline, source, &context, watch);
         if failure.is_none() {
             let fields = fields.lock().unwrap_or_else(PoisonError::into_inner);
             let errors = threads.install(|| compare(&*scene, &fields))?;
-            telling.details = json!({
+            context.details = json!({
                 "scene": "vortex", "flow_rms_error": errors.flow, "jacobian_rms_error": errors.jacobian,
             });
-            if !self.tell.json {
+            if !self.messages.json {
                 print(&self.words(&errors))?;
             }
         }
-        Ok(report(&summary, failure, telling))
+        Ok(report(&summary, failure, context))
     }
 
     /// Makes the frames and keeps a copy on disk for the user's own trials.

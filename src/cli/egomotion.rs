@@ -1,18 +1,16 @@
 //! `jacoflow egomotion`: the camera's rigid motion from frame to frame.
 
 use super::arguments::{
-    ComputeArguments, InputArguments, MethodArguments, SiteArguments, TellArguments, parse_positive,
+    ComputeArguments, GridArguments, InputArguments, MessageArguments, MethodArguments, parse_positive,
 };
-use super::flow::prepare;
+use super::flow::{Prepared, prepare_with_covariance};
 use super::interrupt::Watch;
-use super::open::{Opened, compute, in_double, open_input, preprocess_for};
+use super::open::{compute, open_input};
 use super::report::Report;
-use super::run::{Telling, input_details, report, run_pipeline, table_target};
+use super::run::{ReportContext, input_details, run_flow, table_target};
 use crate::error::{Error, Result};
-use crate::flow::{Estimator, Method};
 use crate::motion3d::{self, FieldOptions, Intrinsics, MotionOptions};
-use crate::pipeline::{Egomotion, EgomotionPlan, EstimatorStage, Pipeline, TableTarget};
-use crate::simd::SimdReal;
+use crate::pipeline::{Egomotion, EgomotionPlan, TableTarget};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -45,7 +43,7 @@ pub struct EgomotionCommand {
     #[command(flatten)]
     pub method: MethodArguments,
     #[command(flatten)]
-    pub sites: SiteArguments,
+    pub grid: GridArguments,
     /// Estimator of the motion: auto, ml (maximum likelihood) or efficient (weights from smoothed depths)
     #[arg(long, value_name = "NAME", default_value = "auto", help_heading = "Motion")]
     pub estimator: String,
@@ -59,7 +57,7 @@ pub struct EgomotionCommand {
     /// Most points of a field
     #[arg(long, value_name = "N", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(5..), help_heading = "Motion")]
     pub max_points: Option<usize>,
-    /// Take what is in --region for a thing that moves by itself, which turns by so much (standard deviation
+    /// Take what is in --region for an object that moves by itself and turns by so much (standard deviation
     /// about each axis) beside the rotation of the rest of the picture: 0.001 for a car
     #[arg(long, value_name = "RAD/FRAME", value_parser = parse_positive, requires = "region", help_heading = "Motion")]
     pub object_rotation_std: Option<f64>,
@@ -88,7 +86,7 @@ pub struct EgomotionCommand {
     #[command(flatten)]
     pub compute: ComputeArguments,
     #[command(flatten)]
-    pub tell: TellArguments,
+    pub messages: MessageArguments,
 }
 
 impl EgomotionCommand {
@@ -100,25 +98,32 @@ impl EgomotionCommand {
             let got = format!("{},{}", pitch.0, pitch.1);
             return Err(Error::argument("pixel_pitch", "none, as motion is estimated from flow in px", got));
         }
-        if self.method.no_covariance {
-            return Err(Error::argument("no_covariance", "a covariance, which weighs the points", "none"));
-        }
-        let prepared = prepare(&opened, &self.input, &self.method, &self.seen(), &self.compute)?;
-        let method = prepared.estimator.method();
-        if matches!(method, Method::HornSchunck(_)) {
-            return Err(Error::argument("method", "one with a covariance", method.name()));
-        }
+        let Prepared { plan: stream, is_double, .. } = prepare_with_covariance(
+            &opened,
+            &self.input,
+            &self.method,
+            &self.seen(),
+            &self.compute,
+            "which weighs the points",
+        )?;
         let sink = Egomotion::open(plan)?;
-        if in_double(self.compute.precision, &opened.first, false) {
-            self.run::<f64>(opened, prepared.estimator, sink, watch)
+        let mut details = input_details(&opened, &self.grid);
+        if let Value::Object(details) = &mut details {
+            details.insert("method".into(), stream.estimator().method().name().into());
+            details.insert("estimator".into(), json!(self.estimator));
+        }
+        let context =
+            ReportContext { command: "egomotion", messages: &self.messages, output: self.output.as_deref(), details };
+        if is_double {
+            run_flow::<f64>(opened, stream, vec![Box::new(sink)], context, watch)
         } else {
-            self.run::<f32>(opened, prepared.estimator, sink, watch)
+            run_flow::<f32>(opened, stream, vec![Box::new(sink)], context, watch)
         }
     }
 
-    /// Where flow is wanted: all over the picture where its rest tells the rotation.
-    fn seen(&self) -> SiteArguments {
-        let mut seen = self.sites.clone();
+    /// Where flow is wanted: in the whole picture where its rest gives the rotation.
+    fn seen(&self) -> GridArguments {
+        let mut seen = self.grid.clone();
         if self.object_rotation_std.is_some() {
             seen.region = None;
         }
@@ -139,7 +144,7 @@ impl EgomotionCommand {
         let threads = compute(&self.compute)?.0;
         Ok(EgomotionPlan {
             camera: intrinsics(&self.intrinsics)?,
-            field: FieldOptions { spacing: self.spacing, most: self.max_points, region: self.sites.region },
+            field: FieldOptions { spacing: self.spacing, most: self.max_points, region: self.grid.region },
             motion: MotionOptions {
                 method,
                 robust: !self.no_robust,
@@ -148,7 +153,7 @@ impl EgomotionCommand {
                 ..MotionOptions::default()
             },
             object_rotation_std: self.object_rotation_std,
-            target: table_target(self.output.as_deref(), self.force, self.tell.json)?,
+            target: table_target(self.output.as_deref(), self.force, self.messages.json)?,
             alternatives: self.others()?,
             pictures: self.picture.clone(),
             maps: self.maps.clone(),
@@ -177,24 +182,6 @@ impl EgomotionCommand {
             return Err(Error::argument(name, wanted, folder.display()));
         }
         Ok(())
-    }
-
-    fn run<T: SimdReal>(&self, opened: Opened, estimator: Estimator, sink: Egomotion, watch: &Watch) -> Result<Report> {
-        let mut details = input_details(&opened, &self.sites);
-        if let Value::Object(details) = &mut details {
-            details.insert("method".into(), estimator.method().name().into());
-            details.insert("estimator".into(), json!(self.estimator));
-        }
-        let steps = preprocess_for(&estimator, &self.input)?;
-        let stage = EstimatorStage::recursive(estimator, self.method.recursive()?)?;
-        let mut pipeline = Pipeline::<T>::new(Box::new(stage))
-            .with_preprocess(steps)
-            .with_threads(compute(&self.compute)?.0)
-            .with_numbering(opened.numbering)
-            .with_sink(Box::new(sink));
-        let telling = Telling { command: "egomotion", tell: &self.tell, output: self.output.as_deref(), details };
-        let (summary, failure) = run_pipeline(&mut pipeline, opened.source, &telling, watch);
-        Ok(report(&summary, failure, telling))
     }
 }
 

@@ -1,19 +1,21 @@
 //! `jacoflow filter`: flow filtered in time, a field for every frame.
 
 use super::arguments::{
-    ComputeArguments, FilterArguments, InputArguments, OutputArguments, Precision, SiteArguments, TellArguments,
+    ComputeArguments, FilterArguments, GridArguments, InputArguments, MessageArguments, OutputArguments,
     describe_filter,
 };
 use super::flow::{expect_output, plan_output};
 use super::interrupt::Watch;
 use super::open::{Opened, compute, in_double, open_input, preprocess, read_mask};
-use super::report::{Report, tell};
-use super::run::{Telling, input_details, report, run_pipeline};
+use super::report::{Report, print_message};
+use super::run::{ReportContext, input_details, report, run_pipeline};
 use crate::error::{Error, Result};
+use crate::image::Preprocess;
 use crate::io::Element;
 use crate::pipeline::{FilterStage, OutputPlan, Pipeline, check_target};
 use crate::simd::SimdReal;
 use crate::temporal::{FlowFilter, FlowFilterOptions};
+use crate::types::Precision;
 use clap::Args;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -27,8 +29,8 @@ use std::path::{Path, PathBuf};
     Examples:\n  \
     jacoflow filter frames/ -o out/ --profile patent --quantise --smooth 3\n  \
     jacoflow filter frames/ --profile measured --points 140,140 > point.csv\n  \
-    jacoflow filter frames/ -o out/ --limit 200 --save-state state.npz\n  \
-    jacoflow filter frames/ -o out/ --first 200 --resume state.npz"
+    jacoflow filter frames/ -o out/ --stop 200 --save-state state.npz\n  \
+    jacoflow filter frames/ -o out/ --start 200 --resume state.npz"
 )]
 pub struct FilterCommand {
     #[command(flatten)]
@@ -36,7 +38,7 @@ pub struct FilterCommand {
     #[command(flatten)]
     pub filter: FilterArguments,
     #[command(flatten)]
-    pub sites: SiteArguments,
+    pub grid: GridArguments,
     #[command(flatten)]
     pub output: OutputArguments,
     /// Save the state after the last frame (.npz)
@@ -48,7 +50,7 @@ pub struct FilterCommand {
     #[command(flatten)]
     pub compute: ComputeArguments,
     #[command(flatten)]
-    pub tell: TellArguments,
+    pub messages: MessageArguments,
 }
 
 impl FilterCommand {
@@ -59,31 +61,39 @@ impl FilterCommand {
         }
         let opened = open_input(&self.input)?;
         let options = self.options(&opened)?;
+        let steps = preprocess(&self.input, options.mask.as_ref())?;
         if let Some(path) = &self.save_state {
             check_target(path, self.output.force || self.resume.as_ref() == Some(path))?;
         }
         if let Some(path) = &self.resume {
-            return self.resume(path, opened, &options, watch);
+            return self.resume(path, opened, &options, steps, watch);
         }
         // Small measurement noise is beyond single precision; see `FlowFilter`.
         if in_double(self.compute.precision, &opened.first, options.measurement_noise < 0.25) {
-            self.run(opened, FilterStage::<f64>::new(options), watch)
+            self.run(opened, FilterStage::<f64>::new(options, steps), watch)
         } else {
-            self.run(opened, FilterStage::<f32>::new(options), watch)
+            self.run(opened, FilterStage::<f32>::new(options, steps), watch)
         }
     }
 
     /// Goes on with a saved filter, in the precision that it was saved in.
-    fn resume(&self, path: &Path, opened: Opened, options: &FlowFilterOptions, watch: &Watch) -> Result<Report> {
+    fn resume(
+        &self,
+        path: &Path,
+        opened: Opened,
+        options: &FlowFilterOptions,
+        steps: Preprocess,
+        watch: &Watch,
+    ) -> Result<Report> {
         if self.compute.precision != Precision::Auto {
             return Err(Error::argument("precision", "auto with --resume, whose state has its own", "another"));
         }
         let (threads, simd) = (options.threads, options.simd);
         match FlowFilter::<f64>::load(path) {
-            Ok(filter) => self.run(opened, FilterStage::resume(filter.with_computation(threads, simd)), watch),
+            Ok(filter) => self.run(opened, FilterStage::resume(filter.with_computation(threads, simd), steps), watch),
             Err(Error::Format { .. }) => {
                 let filter = FlowFilter::<f32>::load(path)?;
-                self.run(opened, FilterStage::resume(filter.with_computation(threads, simd)), watch)
+                self.run(opened, FilterStage::resume(filter.with_computation(threads, simd), steps), watch)
             }
             Err(error) => Err(error),
         }
@@ -91,9 +101,9 @@ impl FilterCommand {
 
     fn options(&self, opened: &Opened) -> Result<FlowFilterOptions> {
         let mut options = self.filter.options(opened.first.dtype)?;
-        options.sites = self.sites.sites()?;
+        options.sites = self.grid.sampling_grid()?;
         options.sites.shape(opened.first.size)?;
-        options.mask = read_mask(self.sites.mask.as_deref(), opened.first.size)?;
+        options.mask = read_mask(self.grid.mask.as_deref(), opened.first.size)?;
         options.frame_period = opened.numbering.period();
         (options.threads, options.simd) = compute(&self.compute)?;
         Ok(options)
@@ -101,32 +111,31 @@ impl FilterCommand {
 
     fn run<T: SimdReal + Element>(&self, opened: Opened, stage: FilterStage<T>, watch: &Watch) -> Result<Report> {
         let options = stage.options();
-        let (description, threads) = (describe_filter(options), options.threads);
-        let mut details = input_details(&opened, &self.sites);
+        let description = describe_filter(options);
+        let mut details = input_details(&opened, &self.grid);
         if let Value::Object(details) = &mut details {
             details.insert("form".into(), options.form.name().into());
             details.insert("save_state".into(), serde_json::json!(self.save_state));
         }
-        let plan: OutputPlan = plan_output(&self.output, &options.sites, self.tell.json, opened.frames)?;
-        expect_output(&plan, self.tell.json, self.save_state.is_some())?;
-        let steps = preprocess(&self.input, options.mask.as_ref())?;
-        let mut pipeline = Pipeline::<T>::new(Box::new(stage))
-            .with_preprocess(steps)
-            .with_threads(threads)
-            .with_numbering(opened.numbering);
-        for sink in plan.sinks(description.to_string(), self.output.ranges())? {
-            pipeline = pipeline.with_sink(sink);
-        }
-        let telling = Telling { command: "filter", tell: &self.tell, output: self.output.output.as_deref(), details };
-        let (summary, mut failure) = run_pipeline(&mut pipeline, opened.source, &telling, watch);
+        let plan: OutputPlan = plan_output(&self.output, &options.sites, self.messages.json, opened.frames)?;
+        expect_output(&plan, self.messages.json, self.save_state.is_some())?;
+        let sinks = plan.sinks(description.to_string(), self.output.ranges())?;
+        let mut pipeline = Pipeline::<T>::new(Box::new(stage)).with_numbering(opened.numbering).with_sinks(sinks);
+        let context = ReportContext {
+            command: "filter",
+            messages: &self.messages,
+            output: self.output.output.as_deref(),
+            details,
+        };
+        let (summary, mut failure) = run_pipeline(&mut pipeline, opened.source, &context, watch);
         if let Some(path) = self.save_state.as_ref().filter(|_| summary.fields > 0) {
             let saved = pipeline.stage().save(path);
-            if saved.is_ok() && !self.tell.quiet {
+            if saved.is_ok() && !self.messages.quiet {
                 let next = opened.numbering.index(summary.fields);
-                tell(&format!("state in {}; go on with --resume and --first {next}", path.display()));
+                print_message(&format!("state in {}; go on with --resume and --start {next}", path.display()));
             }
             failure = failure.or(saved.err());
         }
-        Ok(report(&summary, failure, telling))
+        Ok(report(&summary, failure, context))
     }
 }

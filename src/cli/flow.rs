@@ -1,17 +1,16 @@
 //! `jacoflow flow`: a field for every two or three frames.
 
 use super::arguments::{
-    ComputeArguments, InputArguments, MethodArguments, OutputArguments, SiteArguments, TellArguments,
+    ComputeArguments, GridArguments, InputArguments, MessageArguments, MethodArguments, OutputArguments,
 };
 use super::interrupt::Watch;
-use super::open::{Opened, compute, in_double, open_input, preprocess_for, read_mask};
+use super::open::{Opened, compute, in_double, open_input, preprocess, read_mask};
 use super::report::Report;
-use super::run::{Telling, input_details, report, run_pipeline};
+use super::run::{ReportContext, input_details, run_flow};
 use crate::error::{Error, Result};
-use crate::flow::{Estimator, EstimatorOptions, Method};
-use crate::io::Element;
-use crate::pipeline::{EstimatorStage, OutputPlan, OutputWish, Pipeline, TableTarget};
-use crate::simd::SimdReal;
+use crate::flow::{Estimator, EstimatorOptions};
+use crate::pipeline::{OutputPlan, OutputWish, TableTarget};
+use crate::temporal::StreamPlan;
 use crate::types::SamplingGrid;
 use clap::Args;
 use serde_json::{Value, json};
@@ -25,9 +24,9 @@ use std::path::Path;
     (Ctrl-C), the files that are complete stay; rows of a .csv are then kept in name.partial.csv.\n\n\
     Examples:\n  \
     jacoflow flow frames/ -o out/ --picture colour,quiver\n  \
-    jacoflow flow a.png b.png c.png -o flow.npz --window 3 --rows all\n  \
-    jacoflow flow film.mp4 --points 120,80 --points 200,90 > points.csv\n  \
-    ffmpeg -i film.mp4 -f yuv4mpegpipe - | jacoflow flow - -o out/ --stride 4 --json"
+    jacoflow flow a.png b.png c.png -o flow.npz --method windowed --window-sigma 3\n  \
+    jacoflow flow video.mp4 --points 120,80 --points 200,90 > points.csv\n  \
+    ffmpeg -i video.mp4 -f yuv4mpegpipe - | jacoflow flow - -o out/ --stride 4 --json"
 )]
 pub struct FlowCommand {
     #[command(flatten)]
@@ -35,21 +34,21 @@ pub struct FlowCommand {
     #[command(flatten)]
     pub method: MethodArguments,
     #[command(flatten)]
-    pub sites: SiteArguments,
+    pub grid: GridArguments,
     #[command(flatten)]
     pub output: OutputArguments,
     #[command(flatten)]
     pub compute: ComputeArguments,
     #[command(flatten)]
-    pub tell: TellArguments,
+    pub messages: MessageArguments,
 }
 
-/// An estimator for an opened input, with what it was made from.
+/// The way from the frames of an opened input to fields.
 pub struct Prepared {
-    /// The estimator.
-    pub estimator: Estimator,
-    /// Where it estimates.
-    pub sites: SamplingGrid,
+    /// Preparation, estimator and fusion.
+    pub plan: StreamPlan,
+    /// Whether to compute in double precision.
+    pub is_double: bool,
     /// How fields are made, for metadata and summary.
     pub description: Value,
 }
@@ -59,20 +58,21 @@ pub fn prepare(
     opened: &Opened,
     input: &InputArguments,
     method: &MethodArguments,
-    sites: &SiteArguments,
+    grid: &GridArguments,
     compute_arguments: &ComputeArguments,
 ) -> Result<Prepared> {
     let chosen = method.method(opened.frames, input.smooth)?;
-    let places = sites.sites()?;
+    let places = grid.sampling_grid()?;
     places.shape(opened.first.size)?;
     let (threads, simd) = compute(compute_arguments)?;
+    let recursive = method.recursive()?;
     let common = EstimatorOptions {
-        sites: places.clone(),
-        mask: read_mask(sites.mask.as_deref(), opened.first.size)?,
+        sites: places,
+        mask: read_mask(grid.mask.as_deref(), opened.first.size)?,
         pixel_pitch: method.pixel_pitch.unwrap_or((1.0, 1.0)),
         frame_period: opened.numbering.period(),
-        covariance: !method.no_covariance && !matches!(chosen, Method::HornSchunck(_)),
-        systematic: method.recursive()?.is_some(),
+        covariance: !method.no_covariance && chosen.info().has_covariance,
+        systematic: recursive.is_some(),
         diagnostics: false,
         noise: method.noise,
         threads,
@@ -84,7 +84,29 @@ pub fn prepare(
         object.insert("smooth".into(), json!(input.smooth));
         object.insert("input".into(), json!(opened.name));
     }
-    Ok(Prepared { estimator: Estimator::new(chosen, common)?, sites: places, description })
+    let steps = preprocess(input, common.mask.as_ref())?;
+    let plan = StreamPlan::new(Estimator::new(chosen, common)?, steps, recursive)?;
+    Ok(Prepared { plan, is_double: in_double(compute_arguments.precision, &opened.first, false), description })
+}
+
+/// As [`prepare`], with the covariance that `purpose` needs.
+pub fn prepare_with_covariance(
+    opened: &Opened,
+    input: &InputArguments,
+    method: &MethodArguments,
+    grid: &GridArguments,
+    compute_arguments: &ComputeArguments,
+    purpose: &str,
+) -> Result<Prepared> {
+    if method.no_covariance {
+        return Err(Error::argument("no_covariance", format!("a covariance, {purpose}"), "none"));
+    }
+    let prepared = prepare(opened, input, method, grid, compute_arguments)?;
+    let chosen = prepared.plan.estimator().method();
+    if !chosen.info().has_covariance {
+        return Err(Error::argument("method", "one with a covariance", chosen.name()));
+    }
+    Ok(prepared)
 }
 
 /// Where results go: the user's words, or CSV on standard output for points without any.
@@ -113,9 +135,9 @@ pub fn plan_output(
 }
 
 /// Refuses to compute what nobody would see: without a place for results only the summary of `--json` is
-/// left, or what `besides` is there for.
-pub fn expect_output(plan: &OutputPlan, json: bool, besides: bool) -> Result<()> {
-    if plan.writes_nothing() && !json && !besides {
+/// left, or the output that `has_other` stands for.
+pub fn expect_output(plan: &OutputPlan, json: bool, has_other: bool) -> Result<()> {
+    if plan.writes_nothing() && !json && !has_other {
         let wanted =
             "a folder or a file for the results (- for CSV on standard output), or --json for the summary alone";
         return Err(Error::argument("output", wanted, "none"));
@@ -127,41 +149,24 @@ impl FlowCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let opened = open_input(&self.input)?;
-        let prepared = prepare(&opened, &self.input, &self.method, &self.sites, &self.compute)?;
-        let needed = prepared.estimator.frames_needed();
-        let fields = opened.frames.map(|frames| (frames + 1).saturating_sub(needed));
-        let plan = plan_output(&self.output, &prepared.sites, self.tell.json, fields)?;
-        expect_output(&plan, self.tell.json, false)?;
-        plan.check_parameters(prepared.estimator.model().parameters().iter().map(|parameter| parameter.name))?;
-        if in_double(self.compute.precision, &opened.first, false) {
-            self.run::<f64>(opened, prepared, &plan, watch)
-        } else {
-            self.run::<f32>(opened, prepared, &plan, watch)
-        }
-    }
-
-    fn run<T: SimdReal + Element>(
-        &self,
-        opened: Opened,
-        prepared: Prepared,
-        plan: &OutputPlan,
-        watch: &Watch,
-    ) -> Result<Report> {
-        let mut details = input_details(&opened, &self.sites);
+        let Prepared { plan: stream, is_double, description } =
+            prepare(&opened, &self.input, &self.method, &self.grid, &self.compute)?;
+        let estimator = stream.estimator();
+        let fields = opened.frames.map(|frames| (frames + 1).saturating_sub(estimator.frames_needed()));
+        let plan = plan_output(&self.output, &estimator.options().sites, self.messages.json, fields)?;
+        expect_output(&plan, self.messages.json, false)?;
+        plan.check_parameters(estimator.model().parameters().iter().map(|parameter| parameter.name))?;
+        let mut details = input_details(&opened, &self.grid);
         if let Value::Object(details) = &mut details {
-            details.insert("method".into(), prepared.description["method"].clone());
+            details.insert("method".into(), description["method"].clone());
         }
-        let steps = preprocess_for(&prepared.estimator, &self.input)?;
-        let stage = EstimatorStage::recursive(prepared.estimator, self.method.recursive()?)?;
-        let mut pipeline = Pipeline::<T>::new(Box::new(stage))
-            .with_preprocess(steps)
-            .with_threads(compute(&self.compute)?.0)
-            .with_numbering(opened.numbering);
-        for sink in plan.sinks(prepared.description.to_string(), self.output.ranges())? {
-            pipeline = pipeline.with_sink(sink);
+        let context =
+            ReportContext { command: "flow", messages: &self.messages, output: self.output.output.as_deref(), details };
+        let (description, ranges) = (description.to_string(), self.output.ranges());
+        if is_double {
+            run_flow::<f64>(opened, stream, plan.sinks(description, ranges)?, context, watch)
+        } else {
+            run_flow::<f32>(opened, stream, plan.sinks(description, ranges)?, context, watch)
         }
-        let telling = Telling { command: "flow", tell: &self.tell, output: self.output.output.as_deref(), details };
-        let (summary, failure) = run_pipeline(&mut pipeline, opened.source, &telling, watch);
-        Ok(report(&summary, failure, telling))
     }
 }

@@ -1,6 +1,6 @@
 //! `jacoflow info`: what a recording or a result file holds.
 
-use super::arguments::TellArguments;
+use super::arguments::MessageArguments;
 use super::interrupt::Watch;
 use super::open::open_source;
 use super::progress::Bar;
@@ -30,7 +30,7 @@ pub struct InfoCommand {
     #[arg(required = true, value_name = "INPUT")]
     pub input: Vec<String>,
     #[command(flatten)]
-    pub tell: TellArguments,
+    pub messages: MessageArguments,
 }
 
 impl InfoCommand {
@@ -43,7 +43,7 @@ impl InfoCommand {
             },
             _ => self.recording(watch)?,
         };
-        if !self.tell.json {
+        if !self.messages.json {
             print(&in_words(&summary))?;
         }
         Ok(Report { summary, failure: None })
@@ -57,7 +57,7 @@ impl InfoCommand {
         let first = first.ok_or_else(|| Error::argument("input", "at least one frame", format!("none in {name}")))?;
         let frames = match hint {
             Some(frames) => frames,
-            None => 1 + count(&mut *source, &Bar::new(watch, "info", self.tell.quiet))?,
+            None => 1 + count(&mut *source, &Bar::new(watch, "info", self.messages.quiet))?,
         };
         let (width, height) = first.size();
         Ok(json!({

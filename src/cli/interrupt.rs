@@ -1,4 +1,4 @@
-//! Ctrl-C: the first one asks the run to stop after the frame in hand, the second ends the process at once,
+//! Ctrl-C: the first one stops the run after the current frame, the second ends the process at once,
 //! without its temporary files.
 
 use crate::error::{Error, Result};
@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// Exit code of a process stopped by Ctrl-C (128 + SIGINT).
 pub const EXIT_INTERRUPTED: i32 = 130;
 
-static ASKED: AtomicBool = AtomicBool::new(false);
+static STOP_REQUESTED: AtomicBool = AtomicBool::new(false);
 static RUNNING: AtomicUsize = AtomicUsize::new(0);
 
 /// Held while a command runs: a signal then sets a flag instead of ending the process.
@@ -23,7 +23,7 @@ impl Watch {
         // Where a handler cannot be had (a host program has its own), Ctrl-C keeps its old meaning.
         HANDLER.call_once(|| drop(ctrlc::set_handler(on_signal)));
         if RUNNING.fetch_add(1, Ordering::SeqCst) == 0 {
-            ASKED.store(false, Ordering::SeqCst);
+            STOP_REQUESTED.store(false, Ordering::SeqCst);
         }
         Self(())
     }
@@ -31,7 +31,7 @@ impl Watch {
     /// Fails with [`Error::Interrupted`] once a signal has come.
     #[allow(clippy::unused_self)] // asked only by who watches: else the flag is that of an earlier run
     pub fn check(&self) -> Result<()> {
-        if ASKED.load(Ordering::SeqCst) { Err(Error::Interrupted) } else { Ok(()) }
+        if STOP_REQUESTED.load(Ordering::SeqCst) { Err(Error::Interrupted) } else { Ok(()) }
     }
 }
 
@@ -42,7 +42,7 @@ impl Drop for Watch {
 }
 
 fn on_signal() {
-    let again = ASKED.swap(true, Ordering::SeqCst);
+    let again = STOP_REQUESTED.swap(true, Ordering::SeqCst);
     if again || RUNNING.load(Ordering::SeqCst) == 0 {
         let _no_new_ones = remove_temporaries();
         std::process::exit(EXIT_INTERRUPTED);

@@ -1,16 +1,14 @@
 //! `jacoflow measure`: derived quantities of a region or of points, as rows with standard deviations.
 
-use super::arguments::{ComputeArguments, InputArguments, MethodArguments, SiteArguments, TellArguments};
-use super::flow::prepare;
+use super::arguments::{ComputeArguments, GridArguments, InputArguments, MessageArguments, MethodArguments};
+use super::flow::{Prepared, prepare_with_covariance};
 use super::interrupt::Watch;
-use super::open::{Opened, compute, in_double, open_input, preprocess_for};
+use super::open::open_input;
 use super::report::Report;
-use super::run::{Telling, input_details, report, run_pipeline, table_target};
+use super::run::{ReportContext, input_details, run_flow, table_target};
 use crate::error::{Error, Result};
 use crate::flow::derived::Quantity;
-use crate::flow::{Estimator, Method};
-use crate::pipeline::{EstimatorStage, Measurements, Pipeline};
-use crate::simd::SimdReal;
+use crate::pipeline::Measurements;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -37,7 +35,7 @@ pub struct MeasureCommand {
     #[command(flatten)]
     pub method: MethodArguments,
     #[command(flatten)]
-    pub sites: SiteArguments,
+    pub grid: GridArguments,
     /// A .csv file [default: standard output]
     #[arg(long, short, value_name = "FILE", help_heading = "Output")]
     pub output: Option<PathBuf>,
@@ -47,7 +45,7 @@ pub struct MeasureCommand {
     #[command(flatten)]
     pub compute: ComputeArguments,
     #[command(flatten)]
-    pub tell: TellArguments,
+    pub messages: MessageArguments,
 }
 
 impl MeasureCommand {
@@ -55,49 +53,32 @@ impl MeasureCommand {
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let quantities: Vec<Quantity> =
             self.quantity.iter().map(|name| Quantity::parse(&name.replace('-', "_"))).collect::<Result<_>>()?;
-        let target = table_target(self.output.as_deref(), self.force, self.tell.json)?;
+        let target = table_target(self.output.as_deref(), self.force, self.messages.json)?;
         let opened = open_input(&self.input)?;
         if let Some(quantity) = quantities.iter().find(|q| q.needs_fps() && opened.numbering.rate.is_none()) {
             let expected = format!("frames per second, for {}", quantity.name());
             return Err(Error::argument("fps", expected, "none, and the input does not say"));
         }
-        if self.method.no_covariance {
-            return Err(Error::argument("no_covariance", "a covariance, for the standard deviations", "none"));
-        }
-        let prepared = prepare(&opened, &self.input, &self.method, &self.sites, &self.compute)?;
-        let method = prepared.estimator.method();
-        if matches!(method, Method::HornSchunck(_)) {
-            return Err(Error::argument("method", "one with a covariance", method.name()));
-        }
+        let Prepared { plan, is_double, .. } = prepare_with_covariance(
+            &opened,
+            &self.input,
+            &self.method,
+            &self.grid,
+            &self.compute,
+            "for the standard deviations",
+        )?;
         let sink = Measurements::open(&target, quantities)?;
-        if in_double(self.compute.precision, &opened.first, false) {
-            self.run::<f64>(opened, prepared.estimator, sink, watch)
-        } else {
-            self.run::<f32>(opened, prepared.estimator, sink, watch)
-        }
-    }
-
-    fn run<T: SimdReal>(
-        &self,
-        opened: Opened,
-        estimator: Estimator,
-        sink: Measurements,
-        watch: &Watch,
-    ) -> Result<Report> {
-        let mut details = input_details(&opened, &self.sites);
+        let mut details = input_details(&opened, &self.grid);
         if let Value::Object(details) = &mut details {
             details.insert("quantities".into(), json!(self.quantity));
-            details.insert("method".into(), estimator.method().name().into());
+            details.insert("method".into(), plan.estimator().method().name().into());
         }
-        let steps = preprocess_for(&estimator, &self.input)?;
-        let stage = EstimatorStage::recursive(estimator, self.method.recursive()?)?;
-        let mut pipeline = Pipeline::<T>::new(Box::new(stage))
-            .with_preprocess(steps)
-            .with_threads(compute(&self.compute)?.0)
-            .with_numbering(opened.numbering)
-            .with_sink(Box::new(sink));
-        let telling = Telling { command: "measure", tell: &self.tell, output: self.output.as_deref(), details };
-        let (summary, failure) = run_pipeline(&mut pipeline, opened.source, &telling, watch);
-        Ok(report(&summary, failure, telling))
+        let context =
+            ReportContext { command: "measure", messages: &self.messages, output: self.output.as_deref(), details };
+        if is_double {
+            run_flow::<f64>(opened, plan, vec![Box::new(sink)], context, watch)
+        } else {
+            run_flow::<f32>(opened, plan, vec![Box::new(sink)], context, watch)
+        }
     }
 }

@@ -1,8 +1,7 @@
 //! From input arguments to a source, and what is known about it before the run.
 
-use super::arguments::{ComputeArguments, InputArguments, Precision};
+use super::arguments::{ComputeArguments, InputArguments};
 use crate::error::{Error, Result};
-use crate::flow::{Estimator, Method};
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::io::{
     ChannelPolicy, Colour, FilesSource, FrameFormat, FrameSource, OpenOptions, Selected, open, open_colour, read_image,
@@ -10,14 +9,14 @@ use crate::io::{
 use crate::parallel::Threads;
 use crate::pipeline::{FirstFrame, Numbering, peek};
 use crate::simd::Level;
-use crate::types::{AnyColourFrame, AnyFrame, Frame, Mask};
+use crate::types::{AnyColourFrame, AnyFrame, Frame, Mask, Precision};
 use std::path::{Path, PathBuf};
 
 /// A source that is ready, with its first frame looked at.
 pub struct Opened<F = AnyFrame> {
     /// The frames.
     pub source: Box<dyn FrameSource<F>>,
-    /// What the first frame tells.
+    /// Properties of the first frame.
     pub first: FirstFrame,
     /// Number of frames, where it is known.
     pub frames: Option<usize>,
@@ -72,23 +71,13 @@ fn open_files<P: ChannelPolicy>(
     Ok(Box::new(Selected::new(files, options)?))
 }
 
-/// Quantiser and smoother, which heeds the mask.
+/// Quantiser and smoother; smoothing leaves out masked pixels.
 pub fn preprocess(arguments: &InputArguments, mask: Option<&Mask>) -> Result<Preprocess> {
     Ok(Preprocess {
         quantise: arguments.quantise.map(Quantiser::new).transpose()?,
         smooth: arguments.smooth.map(GaussianSmoother::new).transpose()?,
         mask: mask.cloned(),
     })
-}
-
-/// What is done to frames before this estimator has them. The windowed one smooths on its own, and reads the
-/// noise from the frames before that.
-pub fn preprocess_for(estimator: &Estimator, arguments: &InputArguments) -> Result<Preprocess> {
-    let mut steps = preprocess(arguments, estimator.options().mask.as_ref())?;
-    if matches!(estimator.method(), Method::Windowed(_)) {
-        steps.smooth = None;
-    }
-    Ok(steps)
 }
 
 /// Number of threads and instruction set.
@@ -99,14 +88,10 @@ pub fn compute(arguments: &ComputeArguments) -> Result<(Threads, Option<Level>)>
     ))
 }
 
-/// Whether to compute in double precision for frames of this type; `demanding` work does so unless told
-/// otherwise.
+/// Whether to compute in double precision for frames of this type; `demanding` work does so by
+/// default.
 pub fn in_double(precision: Precision, first: &FirstFrame, demanding: bool) -> bool {
-    match precision {
-        Precision::Auto => demanding || first.dtype == "float64",
-        Precision::Single => false,
-        Precision::Double => true,
-    }
+    (demanding && precision == Precision::Auto) || precision.is_double(first.dtype)
 }
 
 /// Reads a mask: pixels that are not black may be used.

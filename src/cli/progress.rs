@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::time::Duration;
 
-/// Draws a bar on standard error when that is a terminal; fails when the user asked to stop.
+/// Draws a bar on standard error when that is a terminal; fails after Ctrl-C.
 #[derive(Debug)]
 pub struct Bar<'a> {
     watch: &'a Watch,

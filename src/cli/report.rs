@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use serde_json::{Value, json};
 use std::io::Write;
 
-/// What a command has to tell at its end.
+/// Result of a command: its summary, and the error that ended it.
 #[derive(Debug, Default)]
 pub struct Report {
     /// The machine-readable summary.
@@ -26,7 +26,7 @@ pub fn finish(result: Result<Report>, json: bool) -> i32 {
     }
     let code = failure.as_ref().map_or(0, exit_code);
     if let Some(error) = &failure {
-        tell(&format!("error: {error}"));
+        print_message(&format!("error: {error}"));
     }
     if json {
         if let (Some(object), Some(error)) = (summary.as_object_mut(), &failure) {
@@ -38,7 +38,7 @@ pub fn finish(result: Result<Report>, json: bool) -> i32 {
         if let Err(error) = print(&format!("{summary}\n"))
             && !is_broken_pipe(&error)
         {
-            tell(&format!("error: {error}"));
+            print_message(&format!("error: {error}"));
             return 1;
         }
     }
@@ -66,6 +66,6 @@ pub fn print(text: &str) -> Result<()> {
 }
 
 /// Writes a line to standard error. When nobody can read it, nobody needs it.
-pub fn tell(line: &str) {
+pub fn print_message(line: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{line}");
 }

@@ -1,49 +1,64 @@
-//! What the commands with a pipeline have in common: running it, and telling how it ended.
+//! What the commands with a pipeline have in common: running it, and context how it ended.
 
-use super::arguments::{SiteArguments, TellArguments};
+use super::arguments::{GridArguments, MessageArguments};
 use super::interrupt::Watch;
 use super::open::Opened;
 use super::progress::Bar;
-use super::report::{Report, tell};
+use super::report::{Report, print_message};
 use crate::error::{Error, Result};
 use crate::io::FrameSource;
-use crate::pipeline::{Pipeline, Summary, TableTarget, check_target, is_folder};
+use crate::pipeline::{Pipeline, Sink, Summary, TableTarget, check_target, is_folder};
 use crate::simd::SimdReal;
+use crate::temporal::{FlowStream, StreamPlan};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// What a command tells beside the figures of its run.
-pub struct Telling<'a> {
+/// What a report holds beside the figures of the run.
+pub struct ReportContext<'a> {
     /// The subcommand.
     pub command: &'static str,
-    /// The arguments about messages.
-    pub tell: &'a TellArguments,
+    /// Options of messages.
+    pub messages: &'a MessageArguments,
     /// Where results go, if anywhere.
     pub output: Option<&'a Path>,
     /// Further entries of the summary.
     pub details: Value,
 }
 
+/// Estimates flow of the opened frames and hands the fields to `sinks`.
+pub fn run_flow<T: SimdReal>(
+    opened: Opened,
+    plan: StreamPlan,
+    sinks: Vec<Box<dyn Sink<T>>>,
+    context: ReportContext<'_>,
+    watch: &Watch,
+) -> Result<Report> {
+    let stage = Box::new(FlowStream::<T>::new(plan)?);
+    let mut pipeline = Pipeline::new(stage).with_numbering(opened.numbering).with_sinks(sinks);
+    let (summary, failure) = run_pipeline(&mut pipeline, opened.source, &context, watch);
+    Ok(report(&summary, failure, context))
+}
+
 /// Runs the pipeline; what it did, with the error or interruption that ended it early.
 pub fn run_pipeline<T: SimdReal>(
     pipeline: &mut Pipeline<T>,
     source: Box<dyn FrameSource>,
-    telling: &Telling<'_>,
+    context: &ReportContext<'_>,
     watch: &Watch,
 ) -> (Summary, Option<Error>) {
-    let failure = pipeline.run(source, &Bar::new(watch, telling.command, telling.tell.quiet)).err();
+    let failure = pipeline.run(source, &Bar::new(watch, context.command, context.messages.quiet)).err();
     (pipeline.summary(), failure)
 }
 
-/// The report of a run, told in words on standard error unless asked not to.
-pub fn report(summary: &Summary, failure: Option<Error>, telling: Telling<'_>) -> Report {
+/// The report of a run, also printed in words on standard error unless quiet.
+pub fn report(summary: &Summary, failure: Option<Error>, context: ReportContext<'_>) -> Report {
     let interrupted = matches!(failure, Some(Error::Interrupted));
-    let output = place(summary, telling.output, failure.is_none());
-    if !telling.tell.quiet && (failure.is_none() || interrupted) {
-        tell(&in_words(summary, output));
+    let output = place(summary, context.output, failure.is_none());
+    if !context.messages.quiet && (failure.is_none() || interrupted) {
+        print_message(&in_words(summary, output));
     }
     let mut object = json!({
-        "command": telling.command,
+        "command": context.command,
         "frames": summary.frames,
         "fields": summary.fields,
         "valid_share": summary.valid_share(),
@@ -53,13 +68,13 @@ pub fn report(summary: &Summary, failure: Option<Error>, telling: Telling<'_>) -
         "output": output,
         "interrupted": interrupted,
     });
-    if let (Some(object), Value::Object(details)) = (object.as_object_mut(), telling.details) {
+    if let (Some(object), Value::Object(details)) = (object.as_object_mut(), context.details) {
         object.extend(details);
     }
     Report { summary: object, failure }
 }
 
-/// Where the results are: the place asked for; of a run that was stopped the other name that one file has
+/// Where the results are: the requested place; of a run that was stopped the other name that one file has
 /// then, and nothing where it left none.
 fn place<'a>(summary: &'a Summary, asked: Option<&'a Path>, complete: bool) -> Option<&'a Path> {
     let one_file = |asked: &&Path| *asked != Path::new("-") && !is_folder(asked);
@@ -91,12 +106,12 @@ fn in_words(summary: &Summary, output: Option<&Path>) -> String {
 }
 
 /// The entries about the input that every summary has.
-pub fn input_details(opened: &Opened, sites: &SiteArguments) -> Value {
+pub fn input_details(opened: &Opened, grid: &GridArguments) -> Value {
     let (width, height) = opened.first.size;
     json!({
         "input": opened.name, "width": width, "height": height, "dtype": opened.first.dtype,
         "fps": opened.numbering.rate,
-        "region": sites.region.map(|r| [r.x, r.y, r.width, r.height]), "stride": sites.stride.unwrap_or(1),
+        "region": grid.region.map(|r| [r.x, r.y, r.width, r.height]), "stride": grid.stride.unwrap_or(1),
     })
 }
 

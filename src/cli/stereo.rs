@@ -1,9 +1,9 @@
 //! `jacoflow stereo`: the disparity of two views' edge pixels, pair after pair.
 
-use super::arguments::{LayoutArguments, SearchArguments, SelectionArguments, TellArguments, ThreadArguments};
+use super::arguments::{LayoutArguments, MessageArguments, SearchArguments, SelectionArguments, ThreadArguments};
 use super::interrupt::Watch;
 use super::progress::Bar;
-use super::report::{Report, tell};
+use super::report::{Report, print_message};
 use crate::error::{Error, Result};
 use crate::image::Preprocess;
 use crate::image::picture::{GreyRange, draw_disparity};
@@ -46,7 +46,7 @@ pub struct MatchingArguments {
     Examples:\n  \
     jacoflow stereo left/ right/ -o out/ --format npz,pfm --picture pictures/\n  \
     jacoflow stereo l.png r.png -o d.pfm --disparities 0,63 --row-offset 0\n  \
-    jacoflow stereo film.y4m --layout side-by-side -o out/ --method classes"
+    jacoflow stereo video.y4m --layout side-by-side -o out/ --method classes"
 )]
 pub struct StereoCommand {
     /// The left and the right view: folders, images, videos, .y4m or .npy files; one of them that holds both
@@ -75,7 +75,7 @@ pub struct StereoCommand {
     #[command(flatten)]
     pub threads: ThreadArguments,
     #[command(flatten)]
-    pub tell: TellArguments,
+    pub messages: MessageArguments,
 }
 
 /// What was done.
@@ -87,7 +87,7 @@ struct Done {
     found: usize,
     lost: usize,
     row_offset: Option<f64>,
-    /// Pairs whose views hardly agree with any row offset that was searched.
+    /// Pairs whose views agree with no row offset that was searched.
     rows_doubtful: usize,
 }
 
@@ -101,12 +101,12 @@ impl StereoCommand {
         let mut pairs = GreyPairs::start(views, Preprocess::default(), options.threads)?;
         let mut done = Done::default();
         let failure = {
-            let bar = Bar::new(watch, "stereo", self.tell.quiet);
+            let bar = Bar::new(watch, "stereo", self.messages.quiet);
             self.run(&mut pairs, numbering, &options, &formats, &bar, &mut done).err()
         };
         let interrupted = matches!(failure, Some(Error::Interrupted));
-        if !self.tell.quiet && (failure.is_none() || interrupted) {
-            tell(&done.in_words());
+        if !self.messages.quiet && (failure.is_none() || interrupted) {
+            print_message(&done.in_words());
         }
         let summary = json!({
             "command": "stereo", "method": self.matching.method, "pairs": done.pairs, "files": done.files, "disparities": done.found,
@@ -137,7 +137,7 @@ impl StereoCommand {
     fn formats(&self) -> Result<Vec<DisparityFormat>> {
         let listed: Vec<_> = self.format.iter().map(|name| DisparityFormat::parse(name)).collect::<Result<_>>()?;
         let Some(output) = &self.output else {
-            if self.picture.is_none() && !self.tell.json {
+            if self.picture.is_none() && !self.messages.json {
                 return Err(Error::argument("output", "-o OUT, --picture FOLDER or --json", "none of them"));
             }
             return Ok(Vec::new());
@@ -172,7 +172,7 @@ impl StereoCommand {
         }
     }
 
-    /// Matches every pair and writes what was asked for.
+    /// Matches every pair and writes the requested output.
     fn run(
         &self,
         pairs: &mut GreyPairs,
@@ -256,7 +256,7 @@ impl Done {
         match self.row_offset {
             Some(rows) => words += &format!(", row offset {rows:.2}"),
             None if self.rows_doubtful > 0 => {}
-            None => words += "; no pair shows enough to tell the row offset (--row-offset gives it)",
+            None => words += "; no pair shows enough to estimate the row offset (--row-offset gives it)",
         }
         words += &rows_doubted(self.rows_doubtful);
         if self.lost > 0 {

@@ -1,10 +1,10 @@
 //! `jacoflow synth`: recordings of scenes with known motion.
 
-use super::arguments::{ComputeArguments, TellArguments, parse_not_negative, parse_rate, parse_size};
+use super::arguments::{ComputeArguments, MessageArguments, parse_not_negative, parse_rate, parse_size};
 use super::interrupt::Watch;
 use super::open::compute;
 use super::progress::Bar;
-use super::report::{Report, tell};
+use super::report::{Report, print_message};
 use super::scene_list;
 use super::target_recording::{TargetRecording, check_folder};
 use crate::error::{Error, Result};
@@ -92,7 +92,7 @@ pub struct SynthCommand {
     #[command(flatten)]
     pub compute: ComputeArguments,
     #[command(flatten)]
-    pub tell: TellArguments,
+    pub messages: MessageArguments,
 }
 
 /// Samples of the frames written.
@@ -121,7 +121,7 @@ impl SynthCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         if self.list {
-            return scene_list::show(self.tell.json);
+            return scene_list::show(self.messages.json);
         }
         let (Some(name), Some(output)) = (&self.scene, &self.output) else {
             return Err(Error::argument("scene", "the name of a scene and --output", "neither"));
@@ -145,12 +145,12 @@ impl SynthCommand {
         let formats = self.truth_formats()?;
         let (threads, _) = compute(&self.compute)?;
         self.check_output(output)?;
-        let bar = Bar::new(watch, "synth", self.tell.quiet);
+        let bar = Bar::new(watch, "synth", self.messages.quiet);
         let written = self.write(&*scene, output, &formats, threads, &bar);
         drop(bar);
         let told = matches!(written.1, Ok(()) | Err(Error::Interrupted)) || written.0 > 0;
-        if told && !self.tell.quiet {
-            tell(&format!("{} of {} frames written to {}", written.0, self.count(), output.display()));
+        if told && !self.messages.quiet {
+            print_message(&format!("{} of {} frames written to {}", written.0, self.count(), output.display()));
         }
         let summary = json!({
             "command": "synth", "scene": name, "output": output, "frames": written.0, "width": width, "height": height,
@@ -187,7 +187,7 @@ impl SynthCommand {
             boxes: self.boxes.as_deref(),
             rate: self.rate,
             force: self.force,
-            quiet: self.tell.quiet,
+            quiet: self.messages.quiet,
         };
         let (threads, _) = compute(&self.compute)?;
         recording.make(threads, watch)

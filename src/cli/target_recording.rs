@@ -2,7 +2,7 @@
 
 use super::interrupt::Watch;
 use super::progress::Bar;
-use super::report::{Report, tell};
+use super::report::{Report, print_message};
 use crate::error::{Error, Result};
 use crate::io::{MotTable, check_sink, open_colour_sink};
 use crate::parallel::{Progress, Threads};
@@ -42,7 +42,7 @@ impl TargetRecording<'_> {
         // One file appears whole or not at all; of a folder what was complete stays.
         let written = if result.is_err() && !is_folder(self.output) { 0 } else { done };
         if !self.quiet && (written > 0 || matches!(result, Err(Error::Interrupted))) {
-            tell(&format!("{written} of {} frames written to {}", scene.frame_count(), self.output.display()));
+            print_message(&format!("{written} of {} frames written to {}", scene.frame_count(), self.output.display()));
         }
         let (width, height) = scene.size();
         let summary = json!({
@@ -86,7 +86,7 @@ impl TargetRecording<'_> {
     }
 }
 
-/// Refuses a folder that holds something, unless that is wanted.
+/// Refuses a folder that is not empty, unless forced.
 pub fn check_folder(folder: &Path, force: bool) -> Result<()> {
     let occupied = folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
     if occupied && !force {

@@ -7,8 +7,8 @@ mod report;
 mod stereo;
 
 use super::arguments::{
-    InputArguments, ParticleTrackerArguments, StereoTrackerArguments, TargetArguments, TellArguments, ThreadArguments,
-    TrackerArguments,
+    InputArguments, MessageArguments, ParticleTrackerArguments, StereoTrackerArguments, TargetArguments,
+    ThreadArguments, TrackerArguments,
 };
 use super::interrupt::Watch;
 use super::report::Report;
@@ -31,13 +31,13 @@ use std::path::{Path, PathBuf};
     What exists is not replaced without --force, and pictures of an earlier run not before the new one is complete. When a run is stopped (Ctrl-C), what\n\
     there is is kept in name.partial.csv, ....\n\n\
     Examples:\n  \
-    jacoflow track film.y4m > track.csv\n  \
+    jacoflow track video.y4m > track.csv\n  \
     jacoflow track frames/ --box 120,80,24,30 --box 40,60,12,12 -o out/ --format csv,mot\n  \
-    jacoflow track film.mp4 --luminance --point 64,48 -o track.csv --overlay pictures/\n  \
+    jacoflow track video.mp4 --luminance --point 64,48 -o track.csv --overlay pictures/\n  \
     jacoflow track frames/ --method particle --box 40,60,24,66 --box 90,58,26,70 --mot out.txt --csv out.csv --overlay out.y4m\n  \
     jacoflow track frames/ --method particle --boxes first.csv --mot out.txt --foreground maps/\n  \
     jacoflow track left/ right/ --method stereo -o out/ --format csv,json --overlay pictures/ --graph graph.png\n  \
-    jacoflow track film.mp4 --luminance --layout side-by-side --method stereo --cameras 800,0.12 -o clusters.csv"
+    jacoflow track video.mp4 --luminance --layout side-by-side --method stereo --cameras 800,0.12 -o clusters.csv"
 )]
 pub struct TrackCommand {
     #[command(flatten)]
@@ -55,7 +55,7 @@ pub struct TrackCommand {
     #[command(flatten)]
     pub threads: ThreadArguments,
     #[command(flatten)]
-    pub tell: TellArguments,
+    pub messages: MessageArguments,
 }
 
 impl TrackCommand {

@@ -333,14 +333,7 @@ impl MethodSettings {
     }
 
     fn neighbourhood(&self, default: Neighbourhood) -> Neighbourhood {
-        let pixels = self.neighbourhood.clone().unwrap_or(default);
-        let Some(sigma) = self.neighbourhood_sigma else { return pixels };
-        match pixels {
-            Neighbourhood::Rectangle { width, height, .. } => {
-                Neighbourhood::Rectangle { width, height, sigma: Some(sigma) }
-            }
-            Neighbourhood::Points { offsets, .. } => Neighbourhood::Points { offsets, sigma: Some(sigma) },
-        }
+        self.neighbourhood.clone().unwrap_or(default).weighted(self.neighbourhood_sigma)
     }
 
     fn coarse_to_fine(&self) -> Result<CoarseToFineOptions> {

@@ -6,7 +6,7 @@
 //! | `flow` | (H, W, 2) | (u, v), for convenience |
 //! | `jacobian` | (H, W, 2, 2) | [[u_x, u_y], [v_x, v_y]], for convenience; 0 for parameters that the model lacks |
 //! | `status` | (H, W) uint8 | codes, spelled out in the metadata |
-//! | `covariance` | (P (P + 1) / 2, H, W) | upper triangle, row by row; if asked for |
+//! | `covariance` | (P (P + 1) / 2, H, W) | upper triangle, row by row; if requested |
 //! | `residual`, `rank`, `condition` | (H, W) | if the estimator gives them |
 //! | `points` | (N, 2) int64 | pixels (x, y) of the sites, if they are points (then H = 1, W = N) |
 //! | `metadata` | text | JSON: model, parameters, units, sites, frame, library version, options |

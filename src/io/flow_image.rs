@@ -31,7 +31,7 @@ impl FlowImage {
         Ok(Self { width, height, u, v })
     }
 
-    /// The flow of a field on a grid, one pixel a site, back in px/frame whatever the field's pixel pitch is.
+    /// The flow of a field on a grid, one pixel a site, back in px/frame for any pixel pitch of the field.
     ///
     /// # Errors
     /// [`Error::Argument`] named `sites` for a field of points, which is no picture.

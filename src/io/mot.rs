@@ -7,7 +7,7 @@
 //! Source: A. Milan, L. Leal-Taixe, I. Reid, S. Roth, K. Schindler, "MOT16: A Benchmark for Multi-Object
 //! Tracking", 2016.
 
-use super::table::TableWriter;
+use super::table::{TableWriter, table_endings};
 use super::text_boxes::{FIRST_PIXEL, numbers};
 use crate::error::{Error, Result};
 use crate::types::{TargetBox, TrackState, TrackStatus};
@@ -49,31 +49,9 @@ impl MotTable {
         cells.extend(["-1"; 3].map(String::from));
         self.table.row(&cells)
     }
-
-    /// As [`TableWriter::flush`].
-    ///
-    /// # Errors
-    /// As [`TableWriter::flush`].
-    pub fn flush(&mut self) -> Result<()> {
-        self.table.flush()
-    }
-
-    /// Ends the text and gives the file its name.
-    ///
-    /// # Errors
-    /// As [`TableWriter::finish`].
-    pub fn finish(self) -> Result<()> {
-        self.table.finish()
-    }
-
-    /// As [`TableWriter::finish_as`].
-    ///
-    /// # Errors
-    /// As [`TableWriter::finish_as`].
-    pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
-        self.table.finish_as(path)
-    }
 }
+
+table_endings!(MotTable);
 
 fn thousandths(value: f64) -> String {
     let text = format!("{value:.3}");

@@ -1,7 +1,7 @@
 //! Named arrays in one file: numpy's `.npz`, a zip archive of `.npy` files.
 //!
 //! `numpy.load` reads the result without pickle: texts are stored as zero-dimensional `str_` arrays. Arrays
-//! are stored uncompressed, as `numpy.savez` does, since planes of floats hardly shrink; compressed archives
+//! are stored uncompressed, as `numpy.savez` does, since planes of floats barely shrink; compressed archives
 //! are read too. The bytes depend on the content only, not on the time of writing.
 
 use super::npy::{Element, ElementType, NpyHeader, from_fortran_order, write_values};

@@ -227,6 +227,39 @@ impl FieldTable {
     }
 }
 
+/// How tables that wrap a [`TableWriter`] in their field `table` end.
+macro_rules! table_endings {
+    ($table:ty) => {
+        impl $table {
+            /// As [`TableWriter::flush`](crate::io::TableWriter::flush).
+            ///
+            /// # Errors
+            /// As there.
+            pub fn flush(&mut self) -> Result<()> {
+                self.table.flush()
+            }
+
+            /// Ends the table and gives the file its name, as
+            /// [`TableWriter::finish`](crate::io::TableWriter::finish).
+            ///
+            /// # Errors
+            /// As there.
+            pub fn finish(self) -> Result<()> {
+                self.table.finish()
+            }
+
+            /// As [`TableWriter::finish_as`](crate::io::TableWriter::finish_as).
+            ///
+            /// # Errors
+            /// As there.
+            pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
+                self.table.finish_as(path)
+            }
+        }
+    };
+}
+pub(in crate::io) use table_endings;
+
 #[cfg(test)]
 mod tests {
     use super::super::field_npz::tests::numbered;

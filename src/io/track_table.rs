@@ -1,6 +1,6 @@
 //! Tracks as CSV: one row a target and frame.
 
-use super::table::{TableWriter, cell};
+use super::table::{TableWriter, cell, table_endings};
 use crate::error::Result;
 use crate::types::TrackState;
 use std::path::Path;
@@ -138,31 +138,9 @@ impl TrackTable {
         cells.extend_from_slice(further);
         self.table.row(&cells)
     }
-
-    /// As [`TableWriter::flush`].
-    ///
-    /// # Errors
-    /// As [`TableWriter::flush`].
-    pub fn flush(&mut self) -> Result<()> {
-        self.table.flush()
-    }
-
-    /// Ends the table and gives the file its name.
-    ///
-    /// # Errors
-    /// As [`TableWriter::finish`].
-    pub fn finish(self) -> Result<()> {
-        self.table.finish()
-    }
-
-    /// As [`TableWriter::finish_as`].
-    ///
-    /// # Errors
-    /// As [`TableWriter::finish_as`].
-    pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
-        self.table.finish_as(path)
-    }
 }
+
+table_endings!(TrackTable);
 
 #[cfg(test)]
 mod tests {

@@ -209,7 +209,7 @@ impl Seek for Inner {
 /// was there before is kept.
 ///
 /// # Errors
-/// Whatever `write` returns, or [`Error::Io`] with `path`.
+/// Those of `write`, or [`Error::Io`] with `path`.
 pub fn atomic<R>(path: impl AsRef<Path>, write: impl FnOnce(&mut AtomicFile) -> Result<R>) -> Result<R> {
     let mut file = AtomicFile::create(path)?;
     let result = write(&mut file)?;

@@ -52,6 +52,13 @@ impl Neighbourhood {
         }
     }
 
+    /// The same pixels with Gaussian weights of standard deviation `sigma`, px; unchanged for `None`.
+    pub fn weighted(mut self, sigma: Option<f64>) -> Self {
+        let (Self::Rectangle { sigma: own, .. } | Self::Points { sigma: own, .. }) = &mut self;
+        *own = sigma.or(*own);
+        self
+    }
+
     /// Root mean square distance along one axis of the (weighted) pixels from their mean, px: how wide a
     /// Gaussian blurs as the fit does.
     pub fn spread(&self) -> f64 {

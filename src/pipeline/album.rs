@@ -1,9 +1,9 @@
-//! Where drawn pictures go: numbered files in a folder, or a film.
+//! Where drawn pictures go: numbered files in a folder, or a sequence.
 
 use crate::error::{Error, Result};
 use crate::image::picture::{Picture, grey_picture};
 use crate::io::write::TemporaryFolder;
-use crate::io::{FilmWriter, NumberedFiles, write_frame_png, write_picture};
+use crate::io::{NumberedFiles, SequenceWriter, write_frame_png, write_picture};
 use crate::pipeline::output::{check_target, is_folder};
 use crate::pipeline::sink::{Ending, TableTarget, end_table};
 use crate::types::{AnyFrame, Frame};
@@ -23,16 +23,16 @@ enum Place {
     Folder(NumberedFiles),
     /// A folder that holds pictures of an earlier run, until this one is complete.
     Replaced(Replacement),
-    Film(TableTarget, Option<FilmWriter>),
+    Sequence(TableTarget, Option<SequenceWriter>),
 }
 
-/// Whether a path names a film, and not a folder. Other files than films are not written, and a folder that
-/// looks like one is not made by mistake.
-fn is_film(path: &Path, argument: &'static str) -> Result<bool> {
+/// Whether a path names a sequence, and not a folder. Other files than sequences are not written, and a
+/// folder that looks like one is not made by mistake.
+fn is_sequence(path: &Path, argument: &'static str) -> Result<bool> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("y4m")) {
         return Ok(true);
     }
-    let wanted = "a folder for pictures, or a film by the name *.y4m";
+    let wanted = "a folder for pictures, or a sequence by the name *.y4m";
     if path == Path::new("-") {
         return Err(Error::argument(argument, wanted, "- (standard output)"));
     }
@@ -47,13 +47,13 @@ fn is_film(path: &Path, argument: &'static str) -> Result<bool> {
 }
 
 impl Album {
-    /// A folder for `stem_000012.png`, ..., which is made when it does not exist, or a film of `frame_rate`
-    /// frames per second.
+    /// A folder for `stem_000012.png`, ..., which is made when it does not exist, or a sequence of
+    /// `frame_rate` frames per second.
     ///
     /// Errors name `argument`.
     pub fn create(path: &Path, stem: &str, argument: &'static str, frame_rate: f64) -> Result<Self> {
-        let place = if is_film(path, argument)? {
-            Place::Film(TableTarget::File(path.to_path_buf()), Some(FilmWriter::create(path, frame_rate)?))
+        let place = if is_sequence(path, argument)? {
+            Place::Sequence(TableTarget::File(path.to_path_buf()), Some(SequenceWriter::create(path, frame_rate)?))
         } else if earlier(path, stem).is_empty() {
             Place::Folder(NumberedFiles::create(path, stem, "png")?)
         } else {
@@ -62,9 +62,9 @@ impl Album {
         Ok(Self { place, written: 0, latest: None })
     }
 
-    /// Refuses, naming `argument`, to replace a film, or to mix pictures with those of an earlier run.
+    /// Refuses, naming `argument`, to replace a sequence, or to mix pictures with those of an earlier run.
     pub fn check(path: &Path, stem: &str, argument: &'static str) -> Result<()> {
-        if is_film(path, argument)? {
+        if is_sequence(path, argument)? {
             return check_target(path, false).map_err(|error| match error {
                 Error::Argument { expected, got, .. } => Error::Argument { argument, expected, got },
                 other => other,
@@ -81,20 +81,20 @@ impl Album {
 
     /// Adds the picture of the frame `index`.
     pub fn add(&mut self, index: usize, picture: &Picture) -> Result<()> {
-        self.add_by(index, |file| write_picture(file, picture), |film| film.write(picture))
+        self.add_by(index, |file| write_picture(file, picture), |sequence| sequence.write(picture))
     }
 
     /// As [`Album::add`], of grey levels: files have one channel.
     pub fn add_grey(&mut self, index: usize, levels: Frame<u8>) -> Result<()> {
         let frame = AnyFrame::U8(levels);
-        self.add_by(index, |file| write_frame_png(file, &frame), |film| film.write(&grey_picture(&frame)))
+        self.add_by(index, |file| write_frame_png(file, &frame), |sequence| sequence.write(&grey_picture(&frame)))
     }
 
     fn add_by(
         &mut self,
         index: usize,
         to_file: impl FnOnce(&Path) -> Result<()>,
-        to_film: impl FnOnce(&mut FilmWriter) -> Result<()>,
+        to_sequence: impl FnOnce(&mut SequenceWriter) -> Result<()>,
     ) -> Result<()> {
         match &mut self.place {
             Place::Folder(files) => {
@@ -106,14 +106,14 @@ impl Album {
                 to_file(&new.files.path(index))?;
                 self.latest = Some(new.in_place.path(index));
             }
-            Place::Film(_, Some(film)) => to_film(film)?,
-            Place::Film(_, None) => {}
+            Place::Sequence(_, Some(sequence)) => to_sequence(sequence)?,
+            Place::Sequence(_, None) => {}
         }
         self.written += 1;
         Ok(())
     }
 
-    /// A film gets its name when the run is complete; what there is of one that was stopped is kept as
+    /// A sequence gets its name when the run is complete; what there is of one that was stopped is kept as
     /// `name.partial.y4m`. Pictures of an earlier run are replaced, all of them, when the run is complete;
     /// those of one that was stopped are kept in `name.partial` beside them.
     pub fn finish(&mut self, ending: Ending) -> Result<()> {
@@ -121,11 +121,11 @@ impl Album {
         match &mut self.place {
             Place::Folder(_) => {}
             Place::Replaced(new) => self.latest = new.finish(ending, self.latest.as_ref())?,
-            Place::Film(target, writer) => {
-                if let Some(film) = writer.take() {
+            Place::Sequence(target, writer) => {
+                if let Some(sequence) = writer.take() {
                     self.latest = end_table(target, ending, any, |name| match name {
-                        None => film.finish(),
-                        Some(path) => film.finish_as(path),
+                        None => sequence.finish(),
+                        Some(path) => sequence.finish_as(path),
                     })?;
                 }
             }
@@ -137,7 +137,7 @@ impl Album {
     pub fn files(&self) -> (usize, Option<PathBuf>) {
         match &self.place {
             Place::Folder(_) | Place::Replaced(_) => (self.written, self.latest.clone()),
-            Place::Film(..) => (usize::from(self.latest.is_some()), self.latest.clone()),
+            Place::Sequence(..) => (usize::from(self.latest.is_some()), self.latest.clone()),
         }
     }
 }
@@ -172,7 +172,7 @@ impl Replacement {
         Ok(Self { folder: folder.to_path_buf(), stem: stem.into(), waiting, files, in_place })
     }
 
-    /// Replaces the earlier pictures, or keeps what there is beside them; tells where `latest` is then.
+    /// Replaces the earlier pictures, or keeps the new ones beside them; returns the new path of `latest`.
     fn finish(&self, ending: Ending, latest: Option<&PathBuf>) -> Result<Option<PathBuf>> {
         let (to, stale) = match ending {
             Ending::Complete => (self.folder.clone(), earlier(&self.folder, &self.stem)),

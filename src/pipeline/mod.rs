@@ -29,7 +29,7 @@ pub use sink::{
     Collect, Egomotion, EgomotionPlan, Ending, Fields, Measurements, PictureRanges, Pictures, Rows, Sink, Step, Table,
     TableTarget,
 };
-pub use stage::{EstimatorStage, FilterStage, Output, Stage};
+pub use stage::{FilterStage, Output, Stage};
 pub use stereo::{
     BeginSinks, ClusterRows, GraphChart, GraphFile, GreyPair, GreyPairs, PairTimes, StereoFormat, StereoOverlays,
     StereoPicture, StereoRun, StereoSink, StereoStep, StereoSummary,

@@ -1,9 +1,8 @@
 //! Where the results of a run go, decided and checked before the run starts.
 
-use super::sink::{Fields, PictureRanges, Pictures, Rows, Sink, TableTarget};
+use super::sink::TableTarget;
 use crate::error::{Error, Result};
-use crate::io::{Element, FieldFormat};
-use crate::math::Real;
+use crate::io::FieldFormat;
 use crate::types::SamplingGrid;
 use std::path::{Path, PathBuf};
 
@@ -77,7 +76,7 @@ fn format_of(path: &Path) -> Option<Format> {
 ///
 /// A path is a **folder** when it exists as one, ends in a separator or has no extension; it then gets, for
 /// every field, `000012.npz` (and `.flo`, `.png`, `.pfm`) and `000012_colour.png`, numbered by the frame that
-/// the field belongs to, and for the run one `points.csv`. Any other path is a **file** whose extension tells
+/// the field belongs to, and for the run one `points.csv`. Any other path is a **file** whose extension gives
 /// its format: `.csv` takes every field of the run; the others take exactly one field, and its pictures lie
 /// beside it as `name_colour.png`.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -106,7 +105,7 @@ pub enum Place {
     Single(PathBuf),
 }
 
-/// What the user asked for, in words.
+/// What the user requested, in words.
 #[derive(Debug, Clone, Default)]
 pub struct OutputWish<'a> {
     /// The path given, `-` for standard output.
@@ -176,29 +175,6 @@ impl OutputPlan {
             }
             _ => Ok(()),
         }
-    }
-
-    /// The sinks of this plan, whose folder is made where there is none; `options` says (in JSON) how the
-    /// fields are made.
-    ///
-    /// # Errors
-    /// [`Error::Io`] when the folder cannot be made or written.
-    pub fn sinks<T: Real + Element>(&self, options: String, ranges: PictureRanges) -> Result<Vec<Box<dyn Sink<T>>>> {
-        if let Place::Folder(folder) = &self.place {
-            std::fs::create_dir_all(folder).map_err(|source| Error::io(folder, source))?;
-            check_writable(folder)?;
-        }
-        let mut sinks: Vec<Box<dyn Sink<T>>> = Vec::new();
-        if !self.formats.is_empty() {
-            sinks.push(Box::new(Fields::new(self.clone(), options)));
-        }
-        if !self.pictures.is_empty() {
-            sinks.push(Box::new(Pictures::new(self.clone(), ranges)));
-        }
-        if let Some(target) = &self.table {
-            sinks.push(Box::new(Rows::new(target.clone())));
-        }
-        Ok(sinks)
     }
 
     fn into_standard_output(mut self, formats: &[Format]) -> Result<Self> {
@@ -324,7 +300,7 @@ pub fn is_folder(path: &Path) -> bool {
     path.is_dir() || ends_in_separator || path.extension().is_none() && !is_device(path)
 }
 
-/// Whether something is there that is neither a folder nor a regular file: it is written as it is, whatever
+/// Whether a path is neither a folder nor a regular file (a device, a pipe): it is written as it is, with any
 /// its name.
 pub fn is_device(path: &Path) -> bool {
     path.metadata().is_ok_and(|meta| !meta.is_dir() && !meta.is_file())
@@ -356,7 +332,7 @@ pub fn check_target(path: &Path, replace: bool) -> Result<()> {
 }
 
 /// Makes sure that files can be made in `folder`, by making one.
-fn check_writable(folder: &Path) -> Result<()> {
+pub(super) fn check_writable(folder: &Path) -> Result<()> {
     tempfile::tempfile_in(folder).map(drop).map_err(|source| Error::io(folder, source))
 }
 

@@ -88,7 +88,7 @@ impl<F: FrameFormat> FrameSource<F> for Peeked<F> {
     }
 }
 
-/// What the first frame tells about a sequence.
+/// Properties of a sequence, read from its first frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FirstFrame {
     /// `(width, height)` in pixels.
@@ -105,7 +105,7 @@ pub struct FirstFrame {
 pub fn peek<F: FrameFormat>(
     mut source: Box<dyn FrameSource<F>>,
 ) -> Result<(Option<FirstFrame>, Box<dyn FrameSource<F>>)> {
-    // A source may count what is left, so the hint is asked before the first frame is taken.
+    // A source may count what is left, so the hint is read before the first frame is taken.
     let hint = source.len_hint();
     let first = source.next_frame()?;
     let seen = first.as_ref().map(|frame| FirstFrame { size: frame.size(), dtype: frame.dtype() });

@@ -4,21 +4,19 @@ use super::prefetch::Prefetch;
 use super::sink::{Ending, Sink, Step};
 use super::stage::Stage;
 use crate::error::{Error, Result};
-use crate::image::Preprocess;
 use crate::io::FrameSource;
-use crate::parallel::{Progress, Threads};
+use crate::parallel::Progress;
 use crate::simd::SimdReal;
-use crate::types::Status;
+use crate::types::{AnyFrame, Status};
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::Instant;
 
-/// Which frames of the input the pushed ones are: frame `k` of the run is frame `first + k * step` of the
+/// Which frames of the input the pushed ones are: frame `k` of the run is frame `start + k * step` of the
 /// input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Numbering {
     /// Index of the first frame.
-    pub first: usize,
+    pub start: usize,
     /// Distance between used frames.
     pub step: usize,
     /// Frames per second of the input (before `step`).
@@ -27,14 +25,14 @@ pub struct Numbering {
 
 impl Default for Numbering {
     fn default() -> Self {
-        Self { first: 0, step: 1, rate: None }
+        Self { start: 0, step: 1, rate: None }
     }
 }
 
 impl Numbering {
     /// Index in the input of the `k`-th pushed frame.
     pub fn index(&self, k: usize) -> usize {
-        self.first + k * self.step
+        self.start + k * self.step
     }
     /// Seconds between pushed frames.
     pub fn period(&self) -> Option<f64> {
@@ -62,7 +60,7 @@ pub struct Summary {
     /// Files written.
     pub files: usize,
     /// The last of them, under the name that it really has: the rows of a run that was stopped have another
-    /// one than was asked for.
+    /// one than requested.
     pub latest: Option<PathBuf>,
     /// Wall-clock seconds.
     pub seconds: f64,
@@ -77,8 +75,6 @@ impl Summary {
 
 /// A run: frames in, fields out.
 pub struct Pipeline<T> {
-    preprocess: Preprocess,
-    threads: Threads,
     numbering: Numbering,
     stage: Box<dyn Stage<T>>,
     sinks: Vec<Box<dyn Sink<T>>>,
@@ -86,36 +82,19 @@ pub struct Pipeline<T> {
 }
 
 impl<T: SimdReal> Pipeline<T> {
-    /// A pipeline around `stage`, without preparation and without sinks.
+    /// A pipeline around `stage`, without sinks.
     pub fn new(stage: Box<dyn Stage<T>>) -> Self {
-        Self {
-            preprocess: Preprocess::default(),
-            threads: Threads::default(),
-            numbering: Numbering::default(),
-            stage,
-            sinks: Vec::new(),
-            summary: Summary::default(),
-        }
+        Self { numbering: Numbering::default(), stage, sinks: Vec::new(), summary: Summary::default() }
     }
 
-    /// What is done to each frame first (in this order: quantise, smooth).
-    pub fn with_preprocess(mut self, preprocess: Preprocess) -> Self {
-        self.preprocess = preprocess;
-        self
-    }
-    /// Threads of the preparation.
-    pub fn with_threads(mut self, threads: Threads) -> Self {
-        self.threads = threads;
-        self
-    }
     /// Which frames of the input come.
     pub fn with_numbering(mut self, numbering: Numbering) -> Self {
         self.numbering = numbering;
         self
     }
-    /// One more receiver of the results.
-    pub fn with_sink(mut self, sink: Box<dyn Sink<T>>) -> Self {
-        self.sinks.push(sink);
+    /// Further receivers of the results.
+    pub fn with_sinks(mut self, sinks: impl IntoIterator<Item = Box<dyn Sink<T>>>) -> Self {
+        self.sinks.extend(sinks);
         self
     }
 
@@ -130,7 +109,7 @@ impl<T: SimdReal> Pipeline<T> {
 
     /// Works through `source` and ends every sink, however the run ends.
     ///
-    /// `progress` is told the number of frames read, at least once a frame and while waiting for one; its
+    /// `progress` receives the number of frames read, at least once a frame and while waiting for one; its
     /// error stops the run, and what is complete then stays.
     ///
     /// # Errors
@@ -140,7 +119,7 @@ impl<T: SimdReal> Pipeline<T> {
         let start = Instant::now();
         let worked = self.work(source, progress);
         let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
-        // Every sink is ended even when an earlier one fails; the first error is the one that is told.
+        // Every sink is ended even when an earlier one fails; the first error is returned.
         let mut result = worked;
         for sink in &mut self.sinks {
             result = result.and(sink.finish(ending));
@@ -163,8 +142,7 @@ impl<T: SimdReal> Pipeline<T> {
             let Some(frame) = frames.next(|| progress.step(done, total))? else { break };
             check_size(&mut size, frame.size(), self.numbering.index(done))?;
             self.summary.frames += 1;
-            let frame = self.threads.install(|| self.preprocess.apply(frame.to_real::<T>()));
-            self.push(Arc::new(frame))?;
+            self.push(frame)?;
         }
         progress.step(self.summary.frames, total)?;
         let needed = self.stage.frames_needed();
@@ -175,7 +153,7 @@ impl<T: SimdReal> Pipeline<T> {
         Ok(())
     }
 
-    fn push(&mut self, frame: Arc<crate::types::Frame<T>>) -> Result<()> {
+    fn push(&mut self, frame: AnyFrame) -> Result<()> {
         let Some((mut field, frame)) = self.stage.push(frame)? else { return Ok(()) };
         field.layout.frame_index = self.numbering.index(field.layout.frame_index);
         let time = self.numbering.time(field.layout.frame_index);

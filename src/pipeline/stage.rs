@@ -1,12 +1,11 @@
 //! The step in the middle: from frames to flow fields.
 
 use crate::error::{Error, Result};
-use crate::flow::Estimator;
+use crate::image::Preprocess;
 use crate::io::Element;
 use crate::simd::SimdReal;
-use crate::temporal::{FlowFilter, FlowFilterOptions, RecursiveFusion, RecursiveOptions};
-use crate::types::{FlowField, Frame};
-use std::collections::VecDeque;
+use crate::temporal::{FlowFilter, FlowFilterOptions, FlowStream};
+use crate::types::{AnyFrame, FlowField, Frame};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -23,7 +22,7 @@ pub trait Stage<T>: Send {
     ///
     /// # Errors
     /// Those of the estimator or filter.
-    fn push(&mut self, frame: Arc<Frame<T>>) -> Result<Option<Output<T>>>;
+    fn push(&mut self, frame: AnyFrame) -> Result<Option<Output<T>>>;
     /// How often a filter had to restart a pixel.
     fn repairs(&self) -> usize {
         0
@@ -38,79 +37,36 @@ pub trait Stage<T>: Send {
     }
 }
 
-/// An [`Estimator`] with a memory of the few frames that it needs, and of the estimates before where they are
-/// fused over time.
-pub struct EstimatorStage<T> {
-    estimator: Estimator,
-    needed: usize,
-    ring: VecDeque<Arc<Frame<T>>>,
-    pushed: usize,
-    fusion: Option<RecursiveFusion<T>>,
-}
-
-impl<T: SimdReal> EstimatorStage<T> {
-    /// A stage without frames yet.
-    pub fn new(estimator: Estimator) -> Self {
-        let needed = estimator.frames_needed();
-        Self { estimator, needed, ring: VecDeque::with_capacity(needed + 1), pushed: 0, fusion: None }
-    }
-
-    /// As [`EstimatorStage::new`]; with options its estimates are fused over time.
-    ///
-    /// # Errors
-    /// Those of [`RecursiveFusion::new`].
-    pub fn recursive(estimator: Estimator, options: Option<RecursiveOptions>) -> Result<Self> {
-        let fusion = options.map(|options| RecursiveFusion::new(&estimator, options)).transpose()?;
-        Ok(Self { fusion, ..Self::new(estimator) })
-    }
-}
-
-impl<T: SimdReal> Stage<T> for EstimatorStage<T> {
+impl<T: SimdReal> Stage<T> for FlowStream<T> {
     fn frames_needed(&self) -> usize {
-        self.needed
+        self.plan().estimator().frames_needed()
     }
 
-    fn push(&mut self, frame: Arc<Frame<T>>) -> Result<Option<Output<T>>> {
-        let needed = self.needed;
-        self.ring.push_back(frame);
-        self.pushed += 1;
-        if self.ring.len() > needed {
-            self.ring.pop_front();
-        }
-        if self.ring.len() < needed {
-            return Ok(None);
-        }
-        let first = self.pushed - needed;
-        let frames: Vec<&Frame<T>> = self.ring.iter().map(AsRef::as_ref).collect();
-        let mut field = self.estimator.estimate(&frames, first)?;
-        if let Some(fusion) = &mut self.fusion {
-            fusion.fuse(&mut field)?;
-        }
-        let place = field.layout.frame_index.saturating_sub(first).min(needed - 1);
-        let frame = Arc::clone(&self.ring[place]);
-        Ok(Some((field, frame)))
+    fn push(&mut self, frame: AnyFrame) -> Result<Option<Output<T>>> {
+        let Some(field) = self.push(frame)? else { return Ok(None) };
+        Ok(self.reference_frame().map(|frame| (field, Arc::clone(frame))))
     }
 }
 
 /// A [`FlowFilter`]: a field for every frame, the first included.
 ///
-/// The filter is made when the first frame has come and told its size, unless one is brought along to be
-/// continued.
+/// The filter is created with the first frame, whose size it needs, unless a saved one is resumed.
 pub struct FilterStage<T> {
+    preprocess: Preprocess,
     options: FlowFilterOptions,
     filter: Option<FlowFilter<T>>,
     pushed: usize,
 }
 
 impl<T: SimdReal> FilterStage<T> {
-    /// A filter that starts with the first frame.
-    pub fn new(options: FlowFilterOptions) -> Self {
-        Self { options, filter: None, pushed: 0 }
+    /// A filter that starts with the first frame; `preprocess` is applied to each frame.
+    pub fn new(options: FlowFilterOptions, preprocess: Preprocess) -> Self {
+        Self { preprocess, options, filter: None, pushed: 0 }
     }
 
     /// A filter that goes on from its saved state.
-    pub fn resume(filter: FlowFilter<T>) -> Self {
-        Self { options: filter.options().clone(), filter: Some(filter), pushed: 0 }
+    pub fn resume(filter: FlowFilter<T>, preprocess: Preprocess) -> Self {
+        Self { preprocess, options: filter.options().clone(), filter: Some(filter), pushed: 0 }
     }
 
     /// The filter's options.
@@ -128,16 +84,17 @@ impl<T: SimdReal + Element> Stage<T> for FilterStage<T> {
         1
     }
 
-    fn push(&mut self, frame: Arc<Frame<T>>) -> Result<Option<Output<T>>> {
+    fn push(&mut self, frame: AnyFrame) -> Result<Option<Output<T>>> {
         let filter = match &mut self.filter {
             Some(filter) => filter,
             empty => empty.insert(FlowFilter::new(frame.size(), self.options.clone())?),
         };
+        let frame = self.options.threads.install(|| self.preprocess.apply(frame.to_real()));
         let mut field = filter.push(&frame)?;
         // A resumed filter counts the frames of its whole life; the run counts its own.
         field.layout.frame_index = self.pushed;
         self.pushed += 1;
-        Ok(Some((field, frame)))
+        Ok(Some((field, Arc::new(frame))))
     }
 
     fn repairs(&self) -> usize {

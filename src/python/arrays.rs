@@ -1,6 +1,6 @@
 //! numpy arrays in, core frames out, and back. Messages name the argument, what it was and what is accepted.
 
-use super::spare;
+use crate::buffer_pool;
 use crate::error::Error;
 use crate::types::{AnyFrame, Frame, Mask, Sample};
 use numpy::ndarray::{ArrayView, IntoDimension, ShapeBuilder};
@@ -42,14 +42,14 @@ pub fn dtype_name(array: &Bound<'_, PyUntypedArray>) -> String {
     array.dtype().str().map_or_else(|_| "unknown".into(), |name| name.to_string())
 }
 
-/// The elements in row-major order, whatever the strides.
+/// The elements in row-major order, for any strides.
 pub fn elements<T: Element + Copy + 'static>(array: &Bound<'_, PyUntypedArray>) -> Option<Vec<T>> {
     let typed = array.cast::<PyArrayDyn<T>>().ok()?.try_readonly().ok()?;
     if let Ok(slice) = typed.as_slice() {
         // `as_slice` also takes Fortran order; only one-dimensional or row-major data may be taken as it
         // lies.
         if array.is_c_contiguous() {
-            return Some(spare::copy(slice));
+            return Some(buffer_pool::copy(slice));
         }
     }
     Some(typed.as_array().iter().copied().collect())
@@ -153,7 +153,7 @@ pub struct Frames<'py> {
 }
 
 impl<'py> Frames<'py> {
-    /// Checks the outer shape; each frame is converted when it is asked for, so that a long stack is never
+    /// Checks the outer shape; each frame is converted when it is needed, so that a long stack is never
     /// copied whole.
     pub fn new(object: &Bound<'py, PyAny>, colour: ColourRule) -> PyResult<Self> {
         let is_sequence =

@@ -165,24 +165,23 @@ impl FrameReader {
             return Err(PyTypeError::new_err("standard input cannot be pickled"));
         }
         let delivered = py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).delivered);
-        let OpenOptions { first, limit, step, .. } = self.options;
+        let OpenOptions { start, stop, step, .. } = self.options;
         let (colour, grey) = self.reading.words();
-        let limit = limit.map(|limit| limit.saturating_sub(delivered));
         let reopen = py.import("jacoflow._jacoflow")?.getattr("_open_frames")?;
-        Ok((reopen, (self.spec.clone(), colour, grey, first + delivered * step, limit, step)))
+        Ok((reopen, (self.spec.clone(), colour, grey, start + delivered * step, stop, step)))
     }
 }
 
 /// Opens a frame source.
 #[pyfunction(name = "_open_frames")]
-#[pyo3(signature = (spec, colour, grey, first, limit, step))]
+#[pyo3(signature = (spec, colour, grey, start, stop, step))]
 pub fn open_frames(
     py: Python<'_>,
     spec: PathBuf,
     colour: Option<&str>,
     grey: Option<&str>,
-    first: i64,
-    limit: Option<i64>,
+    start: i64,
+    stop: Option<i64>,
     step: i64,
 ) -> PyResult<FrameReader> {
     let not_negative = |name: &'static str, value: i64| {
@@ -190,8 +189,8 @@ pub fn open_frames(
     };
     let reading = Reading::parse(colour, grey)?;
     let mut options = OpenOptions::default();
-    options.first = not_negative("first", first)?;
-    options.limit = limit.map(|n| not_negative("limit", n)).transpose()?;
+    options.start = not_negative("start", start)?;
+    options.stop = stop.map(|n| not_negative("stop", n)).transpose()?;
     options.step = options::count("step", options::Integer(step))?;
     let spec = spec.to_string_lossy().into_owned();
     let source = py.detach(|| Source::open(&spec, reading, &options))?;

@@ -33,26 +33,26 @@ impl Work for Quantiser {
     }
 }
 
-/// `frame` (H, W) smoothed by a Gaussian of standard deviation `sigma` px, cut off at `truncate` standard
-/// deviations, reflecting borders.
+/// `frame` (H, W) smoothed by a Gaussian of standard deviation `blur_sigma` px, cut off at `truncate`
+/// standard deviations, reflecting borders.
 ///
 /// Returns a new array (H, W) in the same grey levels, float64 for float64, else float32. NaN damages only
-/// the pixels whose kernel reaches it. ValueError for a negative or infinite `sigma`.
+/// the pixels whose kernel reaches it. ValueError for a negative or infinite `blur_sigma`.
 #[pyfunction]
-#[pyo3(signature = (frame, sigma, *, truncate=None, threads=None))]
+#[pyo3(signature = (frame, blur_sigma, *, truncate=None, threads=None))]
 pub fn smooth<'py>(
     frame: &Bound<'py, PyAny>,
-    sigma: f64,
+    blur_sigma: f64,
     truncate: Option<f64>,
     threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = frame.py();
     let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
     let smoother = match truncate {
-        None => GaussianSmoother::new(sigma),
-        Some(truncate) => GaussianSmoother::with(sigma, truncate, Border::Reflect),
+        None => GaussianSmoother::new(blur_sigma),
+        Some(truncate) => GaussianSmoother::with(blur_sigma, truncate, Border::Reflect),
     };
-    let work = Smooth(smoother.map_err(|e| renamed(e, "smooth", "sigma"))?, Threads::new(threads)?);
+    let work = Smooth(smoother.map_err(|e| renamed(e, "smooth", "blur_sigma"))?, Threads::new(threads)?);
     let smooth = py.detach(|| in_precision(&frame, work));
     arrays::from_any_frame(py, smooth)
 }

@@ -73,7 +73,7 @@ pub fn write_float_map(py: Python<'_>, path: PathBuf, values: &Bound<'_, PyAny>)
     Ok(py.detach(|| write_pfm(&path, &map))?)
 }
 
-/// The format that a file name asks for; `None`: no extension, a folder.
+/// The format that a file name implies; `None`: no extension, a folder.
 fn format_of(path: &Path) -> crate::Result<Option<FieldFormat>> {
     let Some(extension) = path.extension().and_then(|e| e.to_str()) else { return Ok(None) };
     let known = FieldFormat::ALL.into_iter().find(|f| f.extension().eq_ignore_ascii_case(extension));

@@ -4,21 +4,16 @@
 //! [`keep_options`] makes the struct that holds and pickles them, [`constructor`] the `__new__` of a class
 //! that takes them. Python thereby sees the full signature, and an option is added in one line.
 
-/// Hands `$then!` its `[$target]`, the options `$own`, and those that whatever works on frames has.
+/// Hands `$then!` its `[$target]`, the options `$own`, and those that estimators and filters share.
 macro_rules! with_common {
     ($then:ident [$($target:tt)*] $($own:tt)*) => {
         $then! {
             [$($target)*]
             $($own)*
-            smooth: Option<f64> as Option<f64> = None,
-            quantise: Option<f64> as Option<f64> = None,
-            colour: Option<String> as Option<String> = None,
-            points: Object as Object = None,
-            region: Option<Region> as Option<Region> = None,
-            stride: Option<Integer> as Option<Integer> = None,
+            grid: Object as Object = None,
             mask: Object as Object = None,
+            preprocess: Object as Object = None,
             fps: Option<f64> as Option<f64> = None,
-            frame_period: Option<f64> as Option<f64> = None,
             pixel_pitch: Object as Object = None,
             precision: Option<String> as Option<String> = None,
             threads: Option<Integer> as Option<Integer> = None,

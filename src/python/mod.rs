@@ -30,7 +30,6 @@ mod progress;
 mod reference_track;
 mod scenes;
 mod segment;
-mod spare;
 mod stereo;
 mod stereo_track;
 mod target_scenes;

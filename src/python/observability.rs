@@ -1,8 +1,8 @@
 //! `observability`: what theorem 1 of the patent says of every pixel.
 
-use super::arrays::{self, ColourRule, Frames};
+use super::arrays::{self, Frames};
 use super::image::renamed;
-use super::options::{self, Object};
+use super::options::{self, Object, PreprocessOptions};
 use crate::error::Error;
 use crate::flow::{Observability, ObservabilityMap, observability as core};
 use crate::jet::{Neighbourhood, TimeScheme};
@@ -18,19 +18,18 @@ use pyo3::types::PyDict;
 /// `rank_single` of the six without second time derivatives, `condition` code (see `ObservabilityMap`),
 /// `condition_number`, and `known`, false at the border and where a sample is not finite.
 #[pyfunction(name = "_observability")]
-#[pyo3(signature = (frames, *, time_scheme=None, neighbourhood=None, neighbourhood_sigma=None, smooth=None, quantise=None, colour=None, threads=None))]
+#[pyo3(signature = (frames, *, time_scheme=None, neighbourhood=None, neighbourhood_sigma=None, preprocess=None, threads=None))]
 pub fn observability<'py>(
     frames: &Bound<'py, PyAny>,
     time_scheme: Option<&str>,
-    neighbourhood: Object,
+    neighbourhood: Option<&Bound<'py, PyAny>>,
     neighbourhood_sigma: Option<f64>,
-    smooth: Option<f64>,
-    quantise: Option<f64>,
-    colour: Option<&str>,
+    preprocess: Object,
     threads: Option<options::Integer>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let py = frames.py();
-    let frames = Frames::new(frames, ColourRule::parse(colour)?)?;
+    let preprocess = PreprocessOptions::new(py, &preprocess)?;
+    let frames = Frames::new(frames, preprocess.colour)?;
     if frames.count != 3 {
         return Err(Error::argument("frames", "three frames", format!("{} frames", frames.count)).into());
     }
@@ -39,10 +38,11 @@ pub fn observability<'py>(
         options::check_dtype("frames", frames[0].dtype(), frame)?;
     }
     let scheme = time_scheme.map_or(Ok(TimeScheme::default()), TimeScheme::parse);
+    let pixels = neighbourhood.map(options::neighbourhood).transpose()?;
     let request = Request {
-        preprocess: options::preprocess(smooth, quantise, None)?,
+        preprocess: preprocess.steps(None)?,
         scheme: scheme.map_err(|e| renamed(e, "scheme", "time_scheme"))?,
-        neighbourhood: options::neighbourhood(py, &neighbourhood, neighbourhood_sigma, &Neighbourhood::default())?,
+        neighbourhood: pixels.unwrap_or_default().weighted(neighbourhood_sigma),
         threads: options::threads(threads)?,
     };
     let map = py.detach(|| match &frames {

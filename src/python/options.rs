@@ -1,15 +1,15 @@
 //! Options that estimators and the flow filter share, from what Python gives.
 
-use super::arrays;
+use super::arrays::{self, ColourRule};
 use crate::error::Error;
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::jet::Neighbourhood;
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{AnyFrame, Mask, Rect, Sample, SamplingGrid};
+use crate::types::{AnyFrame, Mask, Precision, Rect, Sample, SamplingGrid};
+use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
 
 /// An integer argument. One that 64 bits do not hold becomes the nearest that they do, so that it is refused
 /// by name where it is out of range.
@@ -51,14 +51,46 @@ impl<'py> FromPyObject<'_, 'py> for Region {
 /// An object that may be absent, as an argument takes it and a pickle keeps it.
 pub type Object = Option<Py<PyAny>>;
 
-/// A copy of an array-like option, so that later changes by the user do not reach it.
+/// A deep copy of an option, so that later changes by the user do not reach it.
 pub fn keep(py: Python<'_>, object: Object) -> PyResult<Object> {
-    let copy = |object: Py<PyAny>| {
-        let object = object.into_bound(py);
-        let plain = object.is_instance_of::<PyTuple>();
-        if plain { Ok(object.unbind()) } else { Ok(py.import("numpy")?.getattr("array")?.call1((object,))?.unbind()) }
-    };
+    let copy = |object: Py<PyAny>| Ok(py.import("copy")?.getattr("deepcopy")?.call1((object,))?.unbind());
     object.map(copy).transpose()
+}
+
+/// A group of options: an object of `jacoflow._options`, or none, whose options are all absent.
+pub struct Group<'py>(Option<Bound<'py, PyAny>>);
+
+impl<'py> Group<'py> {
+    /// The argument called `argument`, an object of one of the `classes`, which are listed in the message.
+    pub fn new(py: Python<'py>, argument: &str, classes: &[&str], object: &Object) -> PyResult<Self> {
+        let Some(object) = object else { return Ok(Self(None)) };
+        let object = object.bind(py).clone();
+        let known = py.import("jacoflow._options")?;
+        for class in classes {
+            if object.is_instance(&known.getattr(*class)?)? {
+                return Ok(Self(Some(object)));
+            }
+        }
+        let names: Vec<String> = classes.iter().map(|class| format!("jacoflow.{class}")).collect();
+        let got = object.get_type().name()?;
+        Err(PyTypeError::new_err(format!("{argument}: expected {}, got {got}", names.join(" or "))))
+    }
+
+    /// The option called `name`, if it was given.
+    pub fn get<T: FromPyObjectOwned<'py>>(&self, name: &str) -> PyResult<Option<T>> {
+        let Some(object) = &self.0 else { return Ok(None) };
+        let Some(value) = object.getattr_opt(name)?.filter(|value| !value.is_none()) else { return Ok(None) };
+        value.extract().map(Some).map_err(|error| {
+            let message = Into::<PyErr>::into(error).value(object.py()).to_string();
+            let is_named = message.starts_with(&format!("{name}: "));
+            PyTypeError::new_err(if is_named { message } else { format!("{name}: {message}") })
+        })
+    }
+}
+
+/// The string that an option is, unless it is another object.
+pub fn word(py: Python<'_>, object: &Object) -> Option<String> {
+    object.as_ref()?.extract(py).ok()
 }
 
 /// A count of at least one.
@@ -79,87 +111,86 @@ pub fn simd(name: Option<&str>) -> PyResult<Option<Level>> {
     Ok(name.map(Level::parse).transpose()?)
 }
 
-/// `points`, `region`, `stride`.
-pub fn sites(
-    py: Python<'_>,
-    points: &Object,
-    region: Option<Region>,
-    stride: Option<Integer>,
-) -> PyResult<SamplingGrid> {
-    let stride = stride.map(|n| count("stride", n)).transpose()?;
-    if let Some(points) = points {
-        if region.is_some() || stride.is_some() {
-            let other = if region.is_some() { "region" } else { "stride" };
-            return Err(Error::argument("points", format!("points without {other}"), "both").into());
-        }
-        let inside = arrays::integer_pairs("points", points.bind(py))?
-            .into_iter()
-            .map(|(x, y)| Ok((usize::try_from(x).map_err(|_| (x, y))?, usize::try_from(y).map_err(|_| (x, y))?)));
-        let pixels = inside.collect::<Result<Vec<_>, _>>();
-        return pixels.map(SamplingGrid::Points).map_err(|point: (i64, i64)| {
-            Error::argument("points", "pixels (x, y) inside the frame", format!("{point:?}")).into()
-        });
-    }
-    let region = self::region(region)?;
-    let SamplingGrid::Grid { stride: default, .. } = SamplingGrid::default() else {
-        return Ok(SamplingGrid::default());
+/// `grid`: where to estimate.
+pub fn grid(py: Python<'_>, object: &Object) -> PyResult<SamplingGrid> {
+    let group = Group::new(py, "grid", &["SamplingGrid"], object)?;
+    let region = region(group.get("region")?)?;
+    let stride = group.get("stride")?.map(|n| count("stride", n)).transpose()?;
+    let Some(points) = group.get::<Bound<'_, PyAny>>("points")? else {
+        let SamplingGrid::Grid { stride: default, .. } = SamplingGrid::default() else {
+            return Ok(SamplingGrid::default());
+        };
+        return Ok(SamplingGrid::Grid { region, stride: stride.unwrap_or(default) });
     };
-    Ok(SamplingGrid::Grid { region, stride: stride.unwrap_or(default) })
+    if region.is_some() || stride.is_some() {
+        let other = if region.is_some() { "region" } else { "stride" };
+        return Err(Error::argument("points", format!("points without {other}"), "both").into());
+    }
+    let inside = arrays::integer_pairs("points", &points)?
+        .into_iter()
+        .map(|(x, y)| Ok((usize::try_from(x).map_err(|_| (x, y))?, usize::try_from(y).map_err(|_| (x, y))?)));
+    let pixels = inside.collect::<Result<Vec<_>, _>>();
+    pixels.map(SamplingGrid::Points).map_err(|point: (i64, i64)| {
+        Error::argument("points", "pixels (x, y) inside the frame", format!("{point:?}")).into()
+    })
 }
 
-/// `neighbourhood`: (columns, rows) or an (N, 2) array of offsets; `sigma` weighs it.
-pub fn neighbourhood(
-    py: Python<'_>,
-    value: &Object,
-    sigma: Option<f64>,
-    default: &Neighbourhood,
-) -> PyResult<Neighbourhood> {
-    let Some(value) = value else {
-        return Ok(match (default.clone(), sigma) {
-            (Neighbourhood::Rectangle { width, height, .. }, Some(_)) => {
-                Neighbourhood::Rectangle { width, height, sigma }
-            }
-            (Neighbourhood::Points { offsets, .. }, Some(_)) => Neighbourhood::Points { offsets, sigma },
-            (default, None) => default,
-        });
-    };
-    let value = value.bind(py);
-    if let Ok((columns, rows)) = value.extract::<(Integer, Integer)>() {
+/// `neighbourhood`: (columns, rows) or an (N, 2) array of offsets, of equal weights.
+pub fn neighbourhood(value: &Bound<'_, PyAny>) -> PyResult<Neighbourhood> {
+    let rectangle = |columns, rows| {
         let (width, height) = (count("neighbourhood", columns)?, count("neighbourhood", rows)?);
-        return Ok(Neighbourhood::Rectangle { width, height, sigma });
+        Ok(Neighbourhood::Rectangle { width, height, sigma: None })
+    };
+    if let Ok((columns, rows)) = value.extract::<(Integer, Integer)>() {
+        return rectangle(columns, rows);
     }
     let array = arrays::as_array("neighbourhood", value)?;
     if let Ok([columns, rows]) = array.extract::<[Integer; 2]>() {
-        let (width, height) = (count("neighbourhood", columns)?, count("neighbourhood", rows)?);
-        return Ok(Neighbourhood::Rectangle { width, height, sigma });
+        return rectangle(columns, rows);
     }
     let offsets = arrays::integer_pairs("neighbourhood", array.as_any())?;
     let narrow = offsets.into_iter().map(|(x, y)| Ok((i32::try_from(x)?, i32::try_from(y)?)));
     let offsets = narrow
         .collect::<Result<Vec<_>, std::num::TryFromIntError>>()
         .map_err(|_| Error::argument("neighbourhood", "offsets of a few px", "one far outside"))?;
-    Ok(Neighbourhood::Points { offsets, sigma })
+    Ok(Neighbourhood::Points { offsets, sigma: None })
 }
 
-/// `fps` or `frame_period`, seconds between frames.
-pub fn frame_period(fps: Option<f64>, frame_period: Option<f64>) -> PyResult<Option<f64>> {
-    match (fps, frame_period) {
-        (Some(_), Some(_)) => Err(Error::argument("fps", "fps or frame_period", "both").into()),
-        (Some(fps), None) if !(fps.is_finite() && fps > 0.0) => {
+/// `fps`, as seconds between frames.
+pub fn frame_period(fps: Option<f64>) -> PyResult<Option<f64>> {
+    match fps {
+        Some(fps) if !(fps.is_finite() && fps > 0.0) => {
             Err(Error::argument("fps", "a positive number of frames per second", fps).into())
         }
-        (Some(fps), None) => Ok(Some(1.0 / fps)),
-        (None, period) => Ok(period),
+        fps => Ok(fps.map(|fps| 1.0 / fps)),
     }
 }
 
-/// `smooth` and `quantise`, and the mask that smoothing heeds.
-pub fn preprocess(smooth: Option<f64>, quantise: Option<f64>, mask: Option<&Mask>) -> PyResult<Preprocess> {
-    Ok(Preprocess {
-        quantise: quantise.map(Quantiser::new).transpose()?,
-        smooth: smooth.map(GaussianSmoother::new).transpose()?,
-        mask: mask.cloned(),
-    })
+/// `preprocess`: what is done to each frame first.
+pub struct PreprocessOptions {
+    quantise: Option<f64>,
+    /// Standard deviation of the smoothing, px.
+    pub smooth: Option<f64>,
+    /// What is done with colour.
+    pub colour: ColourRule,
+}
+
+impl PreprocessOptions {
+    /// The options that `object` holds.
+    pub fn new(py: Python<'_>, object: &Object) -> PyResult<Self> {
+        let group = Group::new(py, "preprocess", &["Preprocess"], object)?;
+        let colour = ColourRule::parse(group.get::<String>("colour")?.as_deref())?;
+        Ok(Self { quantise: group.get("quantise")?, smooth: group.get("smooth")?, colour })
+    }
+
+    /// The steps; smoothing leaves out what `mask` excludes.
+    pub fn steps(&self, mask: Option<&Mask>) -> PyResult<Preprocess> {
+        Ok(Preprocess {
+            quantise: self.quantise.map(Quantiser::new).transpose()?,
+            smooth: self.smooth.map(GaussianSmoother::new).transpose()?,
+            mask: mask.cloned(),
+        })
+    }
 }
 
 /// `pixel_pitch`: one length for both axes or (dx, dy).
@@ -177,38 +208,9 @@ pub fn pixel_pitch(py: Python<'_>, value: &Object) -> PyResult<Option<(f64, f64)
     }
 }
 
-/// Which precision a computation runs in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Precision {
-    /// That of the frames: float64 for float64, else float32.
-    Auto,
-    /// float32.
-    Single,
-    /// float64.
-    Double,
-}
-
-impl Precision {
-    /// `precision=None | "float32" | "float64"`.
-    pub fn parse(name: Option<&str>) -> PyResult<Self> {
-        match name {
-            None => Ok(Self::Auto),
-            Some("float32") => Ok(Self::Single),
-            Some("float64") => Ok(Self::Double),
-            Some(other) => {
-                Err(Error::argument("precision", "\"float32\", \"float64\" or None", format!("{other:?}")).into())
-            }
-        }
-    }
-
-    /// Whether a sequence that begins with `frame` is computed in double precision.
-    pub fn is_double(self, frame: &AnyFrame) -> bool {
-        match self {
-            Self::Auto => matches!(frame, AnyFrame::F64(_)),
-            Self::Single => false,
-            Self::Double => true,
-        }
-    }
+/// `precision=None | "float32" | "float64"`.
+pub fn precision(name: Option<&str>) -> PyResult<Precision> {
+    Ok(name.map_or(Ok(Precision::Auto), Precision::parse)?)
 }
 
 /// Refuses a frame that does not continue the sequence.

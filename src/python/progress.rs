@@ -1,4 +1,4 @@
-//! Long work tells how far it has come, and stops on Ctrl-C.
+//! Progress of long work, which stops on Ctrl-C.
 
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -28,7 +28,7 @@ impl<'py> Reporter<'py> {
         Ok(Self { py, callback })
     }
 
-    /// `done` of `total` frames are finished. Raises KeyboardInterrupt when Ctrl-C was pressed, and whatever
+    /// `done` of `total` frames are finished. Raises KeyboardInterrupt when Ctrl-C was pressed, and what
     /// the function raises.
     pub fn step(&self, done: usize, total: usize) -> PyResult<()> {
         self.py.check_signals()?;

@@ -15,9 +15,9 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 /// A moving picture I(x, y, t) with exact flow and Jacobian at every point and time.
 ///
 /// `name` is one of `scenes.names()`; frames have `width` x `height` px, pixel (0, 0) lies at the scene point
-/// `origin` (x, y) px; `random_state` makes everything random; `carrier` (one of `scenes.carriers()`) is what the
-/// motion moves; `parameters` are those of `scenes.parameters(name)`, each in the unit told there. Time t is
-/// in frames, brightness in grey levels of an 8-bit scale.
+/// `origin` (x, y) px; `random_state` makes everything random; `carrier` (one of `scenes.carriers()`) is what
+/// the motion moves; `parameters` are those of `scenes.parameters(name)`, each in the unit given there. Time
+/// t is in frames, brightness in grey levels of an 8-bit scale.
 #[pyclass(module = "jacoflow.scenes", frozen)]
 pub struct Scene {
     kind: String,
@@ -114,7 +114,7 @@ impl Scene {
     ///
     /// Without `between` the velocity at that time. With `between=(a, b)`, frames, the mean velocity between
     /// the times t + a and t + b of the matter that is at each pixel at time t, `(d(b) - d(a)) / (b - a)` for
-    /// displacements d since t: what frames can tell, where paths are curved. (0, 1) is the displacement to
+    /// displacements d since t: what frames can show, where paths are curved. (0, 1) is the displacement to
     /// the next frame, (-1, 1) the mean of those since the last and to the next. Status MASKED and NaN where
     /// the scene has no single truth.
     #[pyo3(signature = (t, *, between=None))]
@@ -177,7 +177,8 @@ impl Scene {
 /// What a camera does to a frame: white noise, rounding, clipping.
 ///
 /// `noise` standard deviation in grey levels; `rounding` "none", "floor" (the patent's quantiser) or
-/// "nearest"; `saturate` clips to 0 ... 255; `random_state` of the noise. Without arguments it changes nothing.
+/// "nearest"; `saturate` clips to 0 ... 255; `random_state` of the noise. Without arguments it changes
+/// nothing.
 #[pyclass(module = "jacoflow.scenes", frozen)]
 pub struct Sensor {
     sensor: CoreSensor,

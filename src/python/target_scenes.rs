@@ -13,11 +13,12 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 /// A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with
 /// exact boxes.
 ///
-/// `name` is one of `scenes.target_scenes()`. `random_state` chooses the recording: world, texture, gait, shake and
-/// noise. `scale` multiplies all lengths; at 1 a frame has 720 x 480 px. `noise` is the standard deviation of
-/// the white noise of each channel, grey levels. `frames` is their number, by default that of the scene; zoom
-/// and sizes reach their last value in the last frame. `colour_cast` r, 0 to 1, grows to the last frame: red
-/// is multiplied by 1 - r, blue by 1 + r / 2. ValueError for an unknown name or an unusable option.
+/// `name` is one of `scenes.target_scenes()`. `random_state` chooses the recording: world, texture, gait,
+/// shake and noise. `scale` multiplies all lengths; at 1 a frame has 720 x 480 px. `noise` is the standard
+/// deviation of the white noise of each channel, grey levels. `frames` is their number, by default that of
+/// the scene; zoom and sizes reach their last value in the last frame. `colour_cast` r, 0 to 1, grows to the
+/// last frame: red is multiplied by 1 - r, blue by 1 + r / 2. ValueError for an unknown name or an unusable
+/// option.
 #[pyclass(module = "jacoflow.scenes", frozen)]
 pub struct TargetScene {
     core: CoreScene,

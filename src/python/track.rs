@@ -152,9 +152,9 @@ pub(super) fn pair(first: &Bound<'_, PyAny>, second: &Bound<'_, PyAny>) -> PyRes
     let levels = GreyLevels::decide_together(&frames);
     let [first, second] = frames.map(|frame| levels.convert(&frame));
     if first.size() != second.size() {
-        let told = |frame: &Frame<f64>| format!("{} x {} px", frame.width(), frame.height());
-        let expected = format!("a frame as large as the first, {}", told(&first));
-        return Err(Error::argument("second", expected, told(&second)).into());
+        let size = |frame: &Frame<f64>| format!("{} x {} px", frame.width(), frame.height());
+        let expected = format!("a frame as large as the first, {}", size(&first));
+        return Err(Error::argument("second", expected, size(&second)).into());
     }
     Ok((first, second))
 }

@@ -3,9 +3,11 @@
 //! * [`FlowFilter`], the dense filter of WO2010/098160, (44)-(55): one small Kalman filter a pixel. A frame
 //!   passes `measurement` (jets of the frame), `kernel` (prediction and update of many pixels at once) and
 //!   `flow_filter` (the field); `store` holds the states, `persist` saves them.
-//! * [`recursive`] fuses the estimates of [`flow`](crate::flow) over time.
+//! * [`FlowStream`] estimates [`flow`](crate::flow) from frames that come one by one; [`recursive`] fuses its
+//!   estimates over time.
 //! * [`dynamics`] is the dynamical system of one pixel, the reference of the kernels.
 
+mod any_filter;
 pub mod dynamics;
 mod flow_filter;
 mod kernel;
@@ -14,8 +16,11 @@ mod options;
 mod persist;
 pub mod recursive;
 mod store;
+mod stream;
 
+pub use any_filter::AnyFlowFilter;
 pub use flow_filter::FlowFilter;
 pub use options::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
 pub use persist::SavedFilter;
 pub use recursive::{RecursiveFusion, RecursiveOptions};
+pub use stream::{AnyFlowStream, FlowStream, Stream, StreamPlan};

@@ -187,6 +187,18 @@ impl Default for FlowFilterOptions {
 }
 
 impl FlowFilterOptions {
+    /// The set of constants called `name`: `patent` or `measured`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `profile` for another word.
+    pub fn profile(name: &str) -> Result<Self> {
+        match name {
+            "patent" => Ok(Self::patent()),
+            "measured" => Ok(Self::measured()),
+            other => Err(Error::argument("profile", "patent or measured", other)),
+        }
+    }
+
     /// The patent's constants (embodiment 2): `Q = diag(1e-1, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-1, 1e-1, 1e-3,
     /// 1e-3, 1e-3, 1e-3)`, `R = 1e-3`, start at 0, with what the patent leaves open: `P0 = I`, `alpha = 1,
     /// beta = 2, kappa = 0`. Augmented, Runge-Kutta, 3x3.

@@ -275,14 +275,14 @@ pub struct SavedFilter {
     pub frame_size: (usize, usize),
     /// How many frames it has taken in.
     pub frames: usize,
-    /// How often a covariance was mended.
+    /// How often a covariance was repaired.
     pub repairs: u64,
     /// The options in words and numbers, as JSON.
     pub options: String,
 }
 
 impl SavedFilter {
-    /// Describes an archive that holds the state of a filter; `None` when it holds something else.
+    /// Describes an archive that holds the state of a filter; `None` for any other archive.
     ///
     /// # Errors
     /// [`Error::Format`] when it is a damaged state or one of another version.

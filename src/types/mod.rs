@@ -3,6 +3,7 @@
 mod field;
 mod frame;
 mod motion;
+mod precision;
 mod region;
 mod status;
 mod track;
@@ -10,6 +11,7 @@ mod track;
 pub use field::{FieldLayout, FlowField};
 pub use frame::{AnyColourFrame, AnyFrame, ColourFrame, Frame, Mask, Sample};
 pub use motion::{AffineFlow, MOTION_NAMES};
+pub use precision::{AnyField, Precision};
 pub use region::{Rect, SamplingGrid};
 pub use status::Status;
 pub use track::{TargetBox, TrackState, TrackStatus};

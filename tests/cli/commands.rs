@@ -82,7 +82,7 @@ fn points_and_regions_agree_with_the_whole() {
 fn frames_are_numbered_as_in_the_input() {
     let place = Place::new();
     place.good("synth affine -o s.npy --frames 12 --size 40x40 --set u=0.05 --set v=0");
-    place.good("flow s.npy -o out --first 2 --step 3 --limit 3 --stride 8");
+    place.good("flow s.npy -o out --start 2 --step 3 --stop 11 --stride 8");
     assert_eq!(place.names("out"), ["000005.npz"]);
     let field = read_npz::<f64>(place.path("out/000005.npz")).unwrap().field;
     assert_eq!(field.layout.frame_index, 5);
@@ -129,9 +129,9 @@ fn the_filter_follows_the_ramp_and_goes_on_from_its_state() {
     let place = Place::new();
     place.good("synth ramp -o ramp.npy --frames 60 --size 24x20 --origin 48,70 --rounding floor");
     let filter = "filter ramp.npy --profile measured --form fast --neighbourhood 9x9";
-    place.good(&format!("{filter} -o whole --limit 60"));
-    place.good(&format!("{filter} -o first --limit 25 --save-state state.npz"));
-    place.good("filter ramp.npy -o second --first 25 --resume state.npz");
+    place.good(&format!("{filter} -o whole --stop 60"));
+    place.good(&format!("{filter} -o first --stop 25 --save-state state.npz"));
+    place.good("filter ramp.npy -o second --start 25 --resume state.npz");
     assert_eq!((place.names("first").len(), place.names("second").len()), (25, 35));
     for index in 25..60 {
         let name = format!("{index:06}.npz");
@@ -155,7 +155,7 @@ fn any_number_of_threads_writes_the_same_bytes() {
     for threads in [1, 2] {
         let smooth = "--smooth 1 --picture colour,curl --format npz,flo";
         place.good(&format!("flow s.npy -o out{threads} --threads {threads} {smooth}"));
-        place.good(&format!("filter s.npy -o filtered{threads} --threads {threads} --limit 2"));
+        place.good(&format!("filter s.npy -o filtered{threads} --threads {threads} --stop 2"));
     }
     for folder in ["out", "filtered"] {
         let (one, two) = (format!("{folder}1"), format!("{folder}2"));

@@ -36,7 +36,7 @@ fn rows(text: &str) -> Vec<std::collections::HashMap<String, String>> {
 fn an_approach_gives_direction_focus_and_time_to_contact() {
     let place = Place::new();
     approach(&place, "frames", 4);
-    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair --no-robust -o motion.csv --picture pictures --json";
+    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --time-scheme pair --no-robust -o motion.csv --picture pictures --json";
     let summary = place.good(line).json();
     assert_eq!((&summary["command"], &summary["fields"]), (&"egomotion".into(), &3.into()));
     let rows = rows(&std::fs::read_to_string(place.path("motion.csv")).unwrap());
@@ -71,7 +71,7 @@ fn an_approach_gives_direction_focus_and_time_to_contact() {
 fn times_to_contact_are_written_for_every_pixel() {
     let place = Place::new();
     approach(&place, "frames", 3);
-    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair --maps maps -o motion.csv --quiet";
+    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --time-scheme pair --maps maps -o motion.csv --quiet";
     place.good(line);
     let files = names(&place.path("maps"));
     assert_eq!(files, ["contact_000000.npz", "contact_000001.npz"]);
@@ -103,7 +103,7 @@ fn times_to_contact_are_written_for_every_pixel() {
 fn rows_go_to_standard_output_and_do_not_depend_on_threads() {
     let place = Place::new();
     approach(&place, "frames", 3);
-    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair --spacing 10 --quiet";
+    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --time-scheme pair --spacing 10 --quiet";
     let one = place.good(&format!("{line} --threads 1")).out;
     assert_eq!(one, place.good(&format!("{line} --threads 3")).out);
     assert_eq!(rows(&one).len(), 2);
@@ -116,7 +116,8 @@ fn rows_go_to_standard_output_and_do_not_depend_on_threads() {
 fn a_region_has_points_enough() {
     let place = Place::new();
     approach(&place, "frames", 3);
-    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair --region 20,16,88,64 --quiet";
+    let line =
+        "egomotion frames --intrinsics 120,120,64,48 --method windowed --time-scheme pair --region 20,16,88,64 --quiet";
     let points = |line: &str| -> Vec<usize> {
         rows(&place.good(line).out).iter().map(|row| row["points"].parse().unwrap()).collect()
     };
@@ -161,7 +162,8 @@ fn thing_ahead(place: &Place, folder: &str, count: i32) {
 fn a_thing_ahead_has_its_own_time_to_contact() {
     let place = Place::new();
     thing_ahead(&place, "frames", 4);
-    let line = "egomotion frames --intrinsics 250,250,96,72 --method windowed --pair --region 92,58,58,48 --quiet";
+    let line =
+        "egomotion frames --intrinsics 250,250,96,72 --method windowed --time-scheme pair --region 92,58,58,48 --quiet";
     let number = |row: &std::collections::HashMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
     let (alone, known) = (rows(&place.good(line).out), rows(&place.good(&format!("{line} --object-rotation-std 0.0005")).out));
     assert_eq!((alone.len(), known.len()), (3, 3));
@@ -186,9 +188,11 @@ fn a_thing_ahead_has_its_own_time_to_contact() {
 fn the_bound_stands_beside_the_deviations() {
     let place = Place::new();
     approach_to(&place, "frames", 3, (112.0, 48.0));
-    for row in
-        rows(&place.good("egomotion frames --intrinsics 120,120,64,48 --preset fast --pair --no-robust --quiet").out)
-    {
+    for row in rows(
+        &place
+            .good("egomotion frames --intrinsics 120,120,64,48 --preset fast --time-scheme pair --no-robust --quiet")
+            .out,
+    ) {
         for name in ["direction_std_deg", "w_x_std", "w_y_std", "w_z_std"] {
             let [own, bound] =
                 [name.to_string(), format!("bound_{name}")].map(|name| row[&name].parse::<f64>().unwrap());
@@ -203,7 +207,7 @@ fn the_bound_stands_beside_the_deviations() {
 fn other_motions_that_explain_the_flow_have_a_table_of_their_own() {
     let place = Place::new();
     approach_to(&place, "frames", 4, (112.0, 48.0));
-    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair --no-robust -o motion.csv --alternatives others.csv --json";
+    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --time-scheme pair --no-robust -o motion.csv --alternatives others.csv --json";
     let summary = place.good(line).json();
     assert_eq!((&summary["files"], &summary["output"]), (&2.into(), &"motion.csv".into()));
     let read = |name: &str| rows(&std::fs::read_to_string(place.path(name)).unwrap());
@@ -243,9 +247,9 @@ fn other_motions_that_explain_the_flow_have_a_table_of_their_own() {
 fn nothing_is_written_where_nothing_can_be_told() {
     let place = Place::new();
     approach(&place, "frames", 2);
-    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --pair";
+    let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --time-scheme pair";
     for (options, words) in [
-        ("--limit 1", "at least 2 frames"),
+        ("--stop 1", "at least 2 frames"),
         ("--pixel-pitch 2", "pixel_pitch: expected none"),
         ("--pixel-pitch 2,1", "2,1"),
     ] {
@@ -275,7 +279,7 @@ fn mistakes_are_told_before_any_work() {
         ("egomotion frames --intrinsics 120,120,64,48 --no-covariance", "no_covariance"),
         ("egomotion frames --intrinsics 120,120,64,48 --json", "output"),
         ("egomotion frames --intrinsics 120,120,64,48 -o rows.txt", "output"),
-        ("egomotion frames --intrinsics 120,120,64,48 --method horn-schunck --pair", "method"),
+        ("egomotion frames --intrinsics 120,120,64,48 --method horn-schunck --time-scheme pair", "method"),
     ] {
         let ended = place.line(line);
         assert!(ended.code != 0 && ended.err.contains(word), "{line}: {} {}", ended.code, ended.err);

@@ -25,13 +25,13 @@ fn unusable_arguments_are_named() {
         ("flow s.npy --method instantaneous --model quadratic", &["model", "affine"]),
         ("flow s.npy --method windowed --smoothness 1", &["smoothness"]),
         ("flow s.npy --rows many", &["rows"]),
-        ("flow s.npy --scheme sideways", &["scheme"]),
+        ("flow s.npy --time-scheme sideways", &["time_scheme"]),
         ("flow s.npy --temporal kalman", &["temporal", "recursive"]),
         ("flow s.npy --forgetting 0.9", &["forgetting"]),
         ("flow s.npy -o x/ --temporal recursive --forgetting 2", &["forgetting"]),
         ("flow s.npy -o x/ --temporal recursive --no-covariance", &["covariance"]),
         ("flow s.npy -o x/ --temporal recursive --method lucas-kanade", &["method", "affine"]),
-        ("flow s.npy --window -1", &["--window"]),
+        ("flow s.npy --window-sigma -1", &["--window-sigma"]),
         ("flow s.npy --neighbourhood 2x2", &["neighbourhood"]),
         ("flow s.npy --region 30,0,20,20", &["region", "40 x 32"]),
         ("flow s.npy --region 1,2,3", &["--region"]),
@@ -51,11 +51,11 @@ fn unusable_arguments_are_named() {
         ("flow s.npy -o out.xyz", &["output", ".npz"]),
         ("flow s.npy -o one.npz", &["output", "folder"]),
         ("flow s.npy -o p --points 1,1 --format flo", &["format"]),
-        ("flow s.npy --limit 1 -o one.npz", &["frames", "1"]),
+        ("flow s.npy --stop 1 -o one.npz", &["frames", "1"]),
         ("flow s.npy", &["output", "--json"]),
         ("filter s.npy", &["output", "--json"]),
         ("flow s.npy -o v1.2", &["output", "v1.2/"]),
-        ("flow s.npy --first 9", &["input"]),
+        ("flow s.npy --start 9", &["input"]),
         ("measure s.npy --quantity rpm", &["fps"]),
         ("measure s.npy --quantity beauty", &["quantity", "divergence"]),
         ("measure s.npy --quantity curl --method horn-schunck", &["method"]),
@@ -186,7 +186,7 @@ fn files_are_named_as_they_were_asked_for() {
     let refused = place.line("synth affine -o z.bmp");
     assert!(refused.code == 2 && refused.err.starts_with("error: output"), "{}", refused.err);
     place.good("synth affine -o frames.v1/ --frames 5 --size 40x32");
-    place.good("flow frames.v1 -o flow.v1/ --limit 3");
+    place.good("flow frames.v1 -o flow.v1/ --stop 3");
     assert_eq!(place.names("flow.v1"), ["000001.npz"]);
     let again = place.line("synth affine -o frames.v1/ --frames 5 --size 40x32");
     assert!(again.code == 2 && again.err.contains("--force"), "{}", again.err);

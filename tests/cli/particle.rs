@@ -99,7 +99,7 @@ fn targets_of_a_file_start_at_their_first_line_under_their_own_numbers() {
     let picture = read_image(place.path("out/track_000006.png"), Grey::Error).unwrap();
     assert_eq!(picture.size(), scene.size());
     // Frames are numbered as in the input, whichever of them are read.
-    place.good(&format!("track frames {QUICK} --boxes first.csv --first 1 --step 3 --mot part.txt"));
+    place.good(&format!("track frames {QUICK} --boxes first.csv --start 1 --step 3 --mot part.txt"));
     let part: Vec<_> = read_mot(place.path("part.txt")).unwrap().iter().map(|b| (b.target, b.frame)).collect();
     assert_eq!(part, [(3, 4)], "the line of 12 at frame 4 is not there, and frame 4 is the last that is read");
 }

@@ -59,7 +59,7 @@ fn rubber_whale_in_colour() {
 fn yosemite() {
     let Some(folder) = data("yosemite/yosemite_sequence") else { return };
     let place = Place::new();
-    let share = to_pictures(&place, &[format!("{folder}/*.tif")], "--limit 4 --smooth 1", 1);
+    let share = to_pictures(&place, &[format!("{folder}/*.tif")], "--stop 4 --smooth 1", 1);
     assert!(share > 0.9, "{share}");
     assert_eq!(read_npz::<f32>(place.path("out/000002.npz")).unwrap().field.layout.frame_size, (316, 252));
 }
@@ -95,7 +95,7 @@ fn the_car_ahead_has_the_time_to_contact_that_the_laser_has() {
     let Some(folder) = data("ttc_kitti_lidar") else { return };
     let place = Place::new();
     let line = format!(
-        "egomotion {folder}/image_02 --luminance --intrinsics 721.5377,721.5377,609.5593,172.854 --preset balanced --pair --region 555,225,160,65 --spacing 8 --quiet"
+        "egomotion {folder}/image_02 --luminance --intrinsics 721.5377,721.5377,609.5593,172.854 --preset balanced --time-scheme pair --region 555,225,160,65 --spacing 8 --quiet"
     );
     let rows = |line: &str| -> Vec<std::collections::HashMap<String, String>> {
         let out = place.good(line).out;

@@ -206,7 +206,7 @@ fn rows_beyond_those_that_are_searched_are_told() {
 #[test]
 fn classes_give_whole_pixels_and_pictures_show_them() {
     let place = recorded(3);
-    let line = "stereo left right --method classes --disparities -8,12 --first 1 --limit 1 -o d.pfm --picture p";
+    let line = "stereo left right --method classes --disparities -8,12 --start 1 --stop 2 -o d.pfm --picture p";
     let ended = place.good(line);
     assert!(ended.err.contains("1 pairs") && ended.out.is_empty(), "{}", ended.err);
     let map = DisparityFormat::Pfm.read(&place.path("d.pfm")).unwrap();
@@ -299,7 +299,7 @@ fn mistakes_are_named_and_leave_nothing() {
         ("stereo left right -o d.npz --format pfm", &["output", "folder"]),
         ("stereo left right -o old.npz", &["output", "--force"]),
         ("stereo left right -o o --threads 0", &["--threads"]),
-        ("stereo left beside.y4m -o o.npz --limit 1", &["right", "(64, 96)", "(64, 192)"]),
+        ("stereo left beside.y4m -o o.npz --stop 1", &["right", "(64, 96)", "(64, 192)"]),
     ] {
         let ended = place.line(line);
         assert_eq!(ended.code, 2, "{line}: {}", ended.err);

@@ -110,7 +110,7 @@ fn tracks_are_drawn_and_told() {
         assert!(again.code == 2 && again.err.contains("--force"), "{}", again.err);
     }
     place.good(&format!("{line} --force"));
-    let rows = place.good(&format!("track left right {SMALL} --cameras 200,0.1,-10 --first 1")).out;
+    let rows = place.good(&format!("track left right {SMALL} --cameras 200,0.1,-10 --start 1")).out;
     assert!(rows.starts_with("step,frame,time,cluster,track") && rows.contains("\n1,2,nan,"), "{rows}");
     let depth = rows.lines().nth(1).unwrap().split(',').nth(28).unwrap();
     assert!((depth.parse::<f64>().unwrap() - 20.0 / 13.0).abs() < 0.1, "{depth}");
@@ -145,7 +145,7 @@ fn mistakes_about_tracks_of_views_are_named_and_leave_nothing() {
         ("left right --method stereo -o t.txt", &["output", ".csv or .json"]),
         ("left right --method stereo -o old.csv", &["output", "--force"]),
         ("left right --method stereo -o - --json", &["output", "--json"]),
-        ("left right --method stereo --limit 1 -o t.csv --disparities -8,8", &["limit", "at least 2"]),
+        ("left right --method stereo --stop 1 -o t.csv --disparities -8,8", &["stop", "at least 2"]),
         ("left beside.y4m --method stereo -o t.csv", &["right", "(64, 96)", "(64, 192)"]),
     ] {
         let ended = place.line(&format!("track {options}"));

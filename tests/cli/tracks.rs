@@ -112,11 +112,11 @@ fn a_moving_square_is_followed() {
 #[test]
 fn frames_are_numbered_as_in_the_input() {
     let place = recorded(9);
-    let ended = place.good(&format!("track s.y4m {BOX} --first 1 --step 3 --limit 3 --overlay o -o - --quiet"));
+    let ended = place.good(&format!("track s.y4m {BOX} --start 1 --step 3 --stop 10 --overlay o -o - --quiet"));
     let table = rows(&ended.out);
     assert_eq!(table.iter().map(|row| row["frame"].as_str()).collect::<Vec<_>>(), ["1", "4", "7"]);
     assert_eq!(place.names("o"), ["track_000001.png", "track_000004.png", "track_000007.png"]);
-    let mot = place.good(&format!("track s.y4m {BOX} --first 1 --limit 2 --format mot"));
+    let mot = place.good(&format!("track s.y4m {BOX} --start 1 --stop 3 --format mot"));
     assert!(mot.out.starts_with("2,1,") && mot.err.contains("2 frames"), "{} {}", mot.out, mot.err);
 }
 
@@ -132,7 +132,7 @@ fn pictures_show_the_box_and_may_be_enlarged() {
     let again = place.line(&format!("track s.y4m {BOX} --overlay boxes"));
     assert!(again.code == 2 && again.err.contains("overlay") && again.err.contains("--force"), "{}", again.err);
     place.good(&format!("track s.y4m {BOX} --overlay boxes --force"));
-    place.good(&format!("track s.y4m {BOX} --limit 2 --overlay boxes --force"));
+    place.good(&format!("track s.y4m {BOX} --stop 2 --overlay boxes --force"));
     assert_eq!(place.names("boxes"), ["track_000000.png", "track_000001.png"], "nothing of the longer run is left");
     // A film instead, which is not replaced unasked; what is in it, the writer's own tests read back.
     let before = std::fs::read(place.path("s.y4m")).unwrap();
@@ -185,7 +185,7 @@ fn mistakes_are_named_and_leave_nothing() {
         ("track s.y4m --overlay film.mp4 --force", &["overlay", "*.y4m"]),
         ("track s.y4m --overlay -", &["overlay", "*.y4m", "standard output"]),
         ("track s.y4m --enlarge 2", &["--overlay"]),
-        ("track s.y4m --limit 1 --json", &["frames", "at least 2"]),
+        ("track s.y4m --stop 1 --json", &["frames", "at least 2"]),
         ("track s.y4m --threads 0", &["--threads"]),
     ] {
         let ended = place.line(line);

@@ -47,7 +47,7 @@ def test_windows_follow_the_flow(tmp_path):
     assert 1.7 <= quick.window.min() and slow.window.max() <= 27.0 + 1e-4
     slow.save(tmp_path / "slow.npz")
     np.testing.assert_array_equal(jacoflow.FlowField.load(tmp_path / "slow.npz").window, slow.window)
-    part = jacoflow.estimate([controlled.frame(controlled.Case(64.0, 2.0, 3.0), t) for t in (0.0, 1.0)], diagnostics=True, points=[[40, 30]])
+    part = jacoflow.estimate([controlled.frame(controlled.Case(64.0, 2.0, 3.0), t) for t in (0.0, 1.0)], diagnostics=True, grid=jacoflow.SamplingGrid(points=[[40, 30]]))
     assert part.window[0] == quick.window[30, 40]
     assert jacoflow.estimate([controlled.frame(controlled.Case(64.0, 2.0, 3.0), t) for t in (0.0, 1.0)]).window is None
 
@@ -66,5 +66,5 @@ def test_small_frames_find_motion_of_a_tenth_of_their_side(size):
     shift, rng = 16, np.random.default_rng(4)
     texture = gaussian_filter(rng.standard_normal((size[0], size[1] + shift)), 2)
     texture = 128 + 40 * texture / texture.std()
-    field = jacoflow.estimate([texture[:, shift:], texture[:, :-shift]], time_scheme="pair")
+    field = jacoflow.estimate([texture[:, shift:], texture[:, :-shift]], method=jacoflow.CoarseToFine(time_scheme="pair"))
     assert np.abs(field.u - shift)[8:-8, 8 : -2 * shift].mean() < 0.02

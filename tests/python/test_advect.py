@@ -51,7 +51,7 @@ def test_a_site_moves_by_its_own_flow(estimated):
 def test_between_sites_of_a_coarse_grid_the_jacobian_counts():
     """A field on every fourth pixel is as exact for affine motion as a dense one; the bilinear mean of a curved one is not."""
     frames = list(scene(seed=4).frames(3))
-    coarse = jacoflow.estimate(frames, method="windowed", stride=4, region=(4, 4, 29, 25))
+    coarse = jacoflow.estimate(frames, method="windowed", grid=jacoflow.SamplingGrid(stride=4, region=(4, 4, 29, 25)))
     assert np.isfinite(coarse.advect([[5.0, 5.5], [32.0, 28.0]])).all()
     assert np.isnan(coarse.advect([[3.9, 5.5], [32.1, 20.0], [20.0, 28.1]])).all()
     dense = jacoflow.estimate(frames, method="windowed")
@@ -144,7 +144,7 @@ def test_mistakes_are_named(truth, arguments, error, message):
 
 
 def test_only_grids_in_pixels(texture):
-    listed = jacoflow.estimate(list(texture), method="windowed", points=[(10, 10), (20, 20)])
+    listed = jacoflow.estimate(list(texture), method="windowed", grid=jacoflow.SamplingGrid(points=[(10, 10), (20, 20)]))
     with pytest.raises(ValueError, match="field: expected one on a grid of pixels.*2 points"):
         listed.advect([[10.0, 10.0]])
     scaled = jacoflow.estimate(list(texture), method="windowed", pixel_pitch=0.5)

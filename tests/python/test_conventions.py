@@ -7,6 +7,7 @@ import pytest
 from conftest import METHODS, moving_texture
 from numpy.testing import assert_allclose, assert_array_equal
 
+from grouped_options import grouped
 import jacoflow
 from jacoflow import Status, scenes
 
@@ -57,7 +58,7 @@ def test_flow_points_right_and_down(method):
     frames = moving_texture(motion=(0.4, 0, 0, 0, 0, 0))
     field = jacoflow.estimate(list(frames), method=method)
     if method == "instantaneous":
-        field = jacoflow.estimate(list(frames), method=method, model="translational", neighbourhood=(7, 7))
+        field = jacoflow.estimate(list(frames), method=jacoflow.Instantaneous(model="translational", neighbourhood=(7, 7)))
     assert np.nanmedian(field.u) > 0.25 and abs(np.nanmedian(field.v)) < 0.1
     field = jacoflow.estimate(list(moving_texture(motion=(0, 0.4, 0, 0, 0, 0))), method="windowed")
     assert np.nanmedian(field.v) > 0.25 and abs(np.nanmedian(field.u)) < 0.1
@@ -139,7 +140,7 @@ def test_threads_do_not_change_a_bit(method, texture):
 def test_filter_threads_do_not_change_a_bit(texture):
     fields = []
     for threads in (1, 2):
-        flow_filter = jacoflow.FlowFilter(threads=threads, form="non_augmented")
+        flow_filter = jacoflow.FlowFilter(threads=threads, profile=jacoflow.FilterProfile(form="non_augmented"))
         fields.append([flow_filter.push(frame) for frame in texture][-1])
     assert_same(*fields)
 
@@ -155,11 +156,11 @@ def first(points):
 def public_objects(texture):
     """One of every public class."""
     sigma = jacoflow.filters.MerweScaledSigmaPoints(2)
-    estimator = jacoflow.FlowEstimator(points=[[10, 10]], method="windowed", neighbourhood=(5, 3), mask=np.ones((40, 48), bool))
+    estimator = jacoflow.FlowEstimator(grid=jacoflow.SamplingGrid(points=[[10, 10]]), method=jacoflow.Windowed(neighbourhood=(5, 3)), mask=np.ones((40, 48), bool))
     estimator.push(texture[0])
     return [
         jacoflow.estimate(texture),
-        jacoflow.estimate(list(texture), method="instantaneous", model="translational", region=(4, 4, 30, 20), stride=3),
+        jacoflow.estimate(list(texture), method=jacoflow.Instantaneous(model="translational"), grid=jacoflow.SamplingGrid(region=(4, 4, 30, 20), stride=3)),
         estimator,
         jacoflow.Status.OK,
         jacoflow.Condition.BOTH,
@@ -173,7 +174,7 @@ def public_objects(texture):
         jacoflow.filters.ParticleFilter(2, 30, batch=3, random_state=5),
         jacoflow.filters.UnscentedKalmanFilter(2, 1, 0.1, first, double, sigma),
         jacoflow.FormatError("x"),
-        jacoflow.FlowFilter(profile="measured", points=[[10, 10]]),
+        jacoflow.FlowFilter(profile="measured", grid=jacoflow.SamplingGrid(points=[[10, 10]])),
     ]
 
 
@@ -213,9 +214,9 @@ def test_views_share_memory_and_are_read_only(texture):
 def test_other_byte_orders_iterators_and_lists_of_four_are_taken():
     scene = scenes.Scene("affine", width=40, height=32)
     frames = scene.frames(3).astype(np.float32)
-    plain = jacoflow.estimate(list(frames), region=(4, 4, 20, 20))
-    swapped = jacoflow.estimate(list(frames.astype(">f4")), region=[4, 4, 20, 20])
-    iterated = jacoflow.estimate((frame for frame in frames), region=np.array([4, 4, 20, 20]))
+    plain = jacoflow.estimate(list(frames), grid=jacoflow.SamplingGrid(region=(4, 4, 20, 20)))
+    swapped = jacoflow.estimate(list(frames.astype(">f4")), grid=jacoflow.SamplingGrid(region=[4, 4, 20, 20]))
+    iterated = jacoflow.estimate((frame for frame in frames), grid=jacoflow.SamplingGrid(region=np.array([4, 4, 20, 20])))
     assert_array_equal(swapped.flow, plain.flow)
     assert_array_equal(iterated.flow, plain.flow)
 
@@ -277,10 +278,10 @@ def test_what_lies_under_the_mask_does_not_matter(options):
     mask = np.ones((56, 64), bool)
     mask[20:30, 25:40] = False
     others = np.where(mask, frames, 255 - frames).astype(np.uint8)
-    one, other = (jacoflow.estimate(stack, mask=mask, **options) for stack in (frames, others))
+    one, other = (jacoflow.estimate(stack, mask=mask, **grouped(**options)) for stack in (frames, others))
     assert_same(one, other)
     assert one.valid.mean() > 0.3
-    filters = [jacoflow.FlowFilter(mask=mask, smooth=1.0) for _ in range(2)]
+    filters = [jacoflow.FlowFilter(mask=mask, preprocess=jacoflow.Preprocess(smooth=1.0)) for _ in range(2)]
     for pair in zip(frames, others, strict=True):
         one, other = (filter.push(frame) for filter, frame in zip(filters, pair, strict=True))
         assert_array_equal(one.flow, other.flow)
@@ -288,14 +289,14 @@ def test_what_lies_under_the_mask_does_not_matter(options):
 
 def test_the_default_smoothing_may_be_written_out():
     frames = bytes_of(64, 56, seed=5)
-    assert_same(jacoflow.estimate(frames, method="windowed"), jacoflow.estimate(frames, method="windowed", smooth=1.5))
+    assert_same(jacoflow.estimate(frames, method="windowed"), jacoflow.estimate(frames, method="windowed", preprocess=jacoflow.Preprocess(smooth=1.5)))
 
 
 @pytest.mark.parametrize("options", [{}, {"noise": 1.0}, {"noise": 1.0, "smooth": 0}])
 def test_neither_axis_comes_first(options):
     frames = [frame.astype(float) for frame in bytes_of(64, 56, seed=6)]
-    one = jacoflow.estimate(frames, method="windowed", **options)
-    other = jacoflow.estimate([np.ascontiguousarray(frame.T) for frame in frames], method="windowed", **options)
+    one = jacoflow.estimate(frames, **grouped(method="windowed", **options))
+    other = jacoflow.estimate([np.ascontiguousarray(frame.T) for frame in frames], **grouped(method="windowed", **options))
     known = one.valid & other.valid.T
     assert known.mean() > 0.5
     for name, mirrored in {"u": "v", "v": "u", "u_x": "v_y", "v_x": "u_y", "u_y": "v_x", "v_y": "u_x"}.items():

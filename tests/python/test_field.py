@@ -97,7 +97,7 @@ def test_the_deviation_of_a_regions_mean_holds_its_error(count, smooth, least):
         for seed in range(12):
             camera = scenes.Sensor(noise=3.0, random_state=seed)
             frames = [camera.apply(frame, index) for index, frame in enumerate(clean)][3 - count :]
-            seen = jacoflow.estimate(frames, smooth=smooth)
+            seen = jacoflow.estimate(frames, preprocess=jacoflow.Preprocess(smooth=smooth))
             for name in ("divergence", "curl"):
                 value, std, sites = seen.region_mean(name, (16, 16, 40, 40))
                 assert sites == 1600
@@ -149,7 +149,7 @@ def test_what_cannot_be_asked(field):
 def test_frame_rate_and_pixel_pitch_scale_results():
     frames = list(scenes.Scene("affine", width=48, height=48).frames(3))
     plain = jacoflow.estimate(frames)
-    scaled = jacoflow.estimate(frames, frame_period=0.5, pixel_pitch=(2.0, 4.0))
+    scaled = jacoflow.estimate(frames, fps=1 / 0.5, pixel_pitch=(2.0, 4.0))
     inside = plain.valid
     assert_allclose(scaled.u[inside], 2 * plain.u[inside], rtol=1e-9)
     assert_allclose(scaled.v[inside], 4 * plain.v[inside], rtol=1e-9)
@@ -164,18 +164,18 @@ def test_points_regions_and_strides_are_parts_of_the_whole(method):
     frames = list(scenes.Scene("affine", width=48, height=40).frames(3))
     whole = jacoflow.estimate(frames, method=method)
     pixels = np.array([[5, 4], [20, 30], [47, 39], [0, 0]])
-    points = jacoflow.estimate(frames, method=method, points=pixels)
+    points = jacoflow.estimate(frames, method=method, grid=jacoflow.SamplingGrid(points=pixels))
     assert points.shape == (4,) and points.flow.shape == (4, 2) and points.covariance.shape == (4, 6, 6)
     assert_array_equal(points.points, pixels)
-    region = jacoflow.estimate(frames, method=method, region=(10, 6, 20, 12))
-    strided = jacoflow.estimate(frames, method=method, stride=4)
-    strided_region = jacoflow.estimate(frames, method=method, region=(3, 2, 30, 21), stride=5)
+    region = jacoflow.estimate(frames, method=method, grid=jacoflow.SamplingGrid(region=(10, 6, 20, 12)))
+    strided = jacoflow.estimate(frames, method=method, grid=jacoflow.SamplingGrid(stride=4))
+    strided_region = jacoflow.estimate(frames, method=method, grid=jacoflow.SamplingGrid(region=(3, 2, 30, 21), stride=5))
     for part in (points, region, strided, strided_region):
         x, y = part.points[..., 0], part.points[..., 1]
         assert_array_equal(part.status, whole.status[y, x])
         assert_allclose(part.flow, whole.flow[y, x], rtol=1e-6, atol=1e-9)
     assert region.shape == (12, 20) and strided.shape == (10, 12) and strided_region.shape == (5, 6)
-    none = jacoflow.estimate(frames, method=method, points=np.zeros((0, 2), int))
+    none = jacoflow.estimate(frames, method=method, grid=jacoflow.SamplingGrid(points=np.zeros((0, 2), int)))
     assert none.shape == (0,) and none.flow.shape == (0, 2) and none.divergence.shape == (0,)
 
 
@@ -191,18 +191,18 @@ def test_masked_pixels_say_so():
 
 def test_other_models_leave_derivatives_zero():
     frames = list(scenes.Scene("affine", width=40, height=40, u_x=0, v_x=0, u_y=0, v_y=0).frames(3))
-    field = jacoflow.estimate(frames, method="instantaneous", model="translational", neighbourhood=(5, 5))
+    field = jacoflow.estimate(frames, method=jacoflow.Instantaneous(model="translational", neighbourhood=(5, 5)))
     assert field.parameters == ("u", "v") and field.model == "translational"
     assert (field.jacobian[field.valid] == 0).all() and np.isnan(field.jacobian[~field.valid]).all()
     assert field.covariance.shape == (40, 40, 6, 6)
-    accelerating = jacoflow.estimate(frames, method="instantaneous", model="accelerating", neighbourhood=(5, 5))
+    accelerating = jacoflow.estimate(frames, method=jacoflow.Instantaneous(model="accelerating", neighbourhood=(5, 5)))
     assert accelerating.parameters[2:] == ("u_t", "v_t")
     assert accelerating.value("u_t").shape == accelerating.std("v_t").shape == (40, 40)
 
 
 def test_minimum_norm_is_marked():
     frames = list(np.tile(np.arange(20.0), (3, 20, 1)))
-    field = jacoflow.estimate(frames, method="instantaneous", rank_deficient="min_norm")
+    field = jacoflow.estimate(frames, method=jacoflow.Instantaneous(rank_deficient="min_norm"))
     assert (field.status[2:-2, 2:-2] == Status.MIN_NORM).all()
     assert np.isfinite(field.flow[2:-2, 2:-2]).all() and not field.valid.any()
 
@@ -234,7 +234,7 @@ def test_files_round_trip(field, tmp_path, extension):
 
 def test_points_and_stacks_go_to_npz(tmp_path):
     frames = scenes.Scene("affine", width=32, height=32).frames(4)
-    points = jacoflow.estimate(list(frames[:3]), points=[[3, 4], [10, 11]])
+    points = jacoflow.estimate(list(frames[:3]), grid=jacoflow.SamplingGrid(points=[[3, 4], [10, 11]]))
     points.save(tmp_path / "points.npz")
     back = FlowField.load(tmp_path / "points.npz")
     assert_array_equal(back.points, points.points)

@@ -40,16 +40,16 @@ def test_any_dtype_goes_into_a_stack(frames, tmp_path):
 
 def test_parts_of_a_source(frames, tmp_path):
     io.write_frames(tmp_path / "stack.npy", frames)
-    assert_array_equal(list(io.frames(tmp_path / "stack.npy", first=1, step=2)), frames[1::2])
-    assert_array_equal(list(io.frames(tmp_path / "stack.npy", limit=2)), frames[:2])
-    for option in ({"first": -1}, {"step": 0}, {"limit": -1}):
+    assert_array_equal(list(io.frames(tmp_path / "stack.npy", start=1, step=2)), frames[1::2])
+    assert_array_equal(list(io.frames(tmp_path / "stack.npy", stop=2)), frames[:2])
+    for option in ({"start": -1}, {"step": 0}, {"stop": -1}):
         with pytest.raises(ValueError, match=next(iter(option))):
             io.frames(tmp_path / "stack.npy", **option)
 
 
 def test_readers_pickle_where_they_stand(frames, tmp_path):
     io.write_frames(tmp_path / "folder", frames)
-    reader = io.frames(tmp_path / "folder", limit=4)
+    reader = io.frames(tmp_path / "folder", stop=4)
     next(reader)
     other = pickle.loads(pickle.dumps(reader))
     assert_array_equal(list(other), frames[1:4])
@@ -112,7 +112,7 @@ def test_colour_round_trips(colour_frames, name, dtype, tmp_path):
     # Y4M rounds luma and chroma: at most (1 + 1.772) / 2 levels before the last rounding.
     apart = np.abs(back.astype(int) - frames).max()
     assert apart <= (1 if name.endswith("y4m") else 0)
-    part = list(io.frames(tmp_path / name, colour="rgb", first=1, step=2))
+    part = list(io.frames(tmp_path / name, colour="rgb", start=1, step=2))
     assert_array_equal(part, back[1::2])
 
 

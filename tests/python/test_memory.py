@@ -29,7 +29,7 @@ def test_a_result_does_not_depend_on_whose_memory_it_lies_in():
             jacoflow.estimate(other, **OPTIONS)
             bad = [np.array(frame, copy=True) for frame in frames(3, dtype=dtype)]
             jacoflow.estimate(bad, mask=mask, **OPTIONS)
-            jacoflow.estimate(bad, model="translational", **OPTIONS)
+            jacoflow.estimate(bad, **{**OPTIONS, "method": jacoflow.Instantaneous(model="translational")})
             assert same(values(jacoflow.estimate(frames(1, dtype=dtype), **OPTIONS)), first)
 
 

@@ -24,7 +24,7 @@ def textured_drive():
 
 def test_a_field_gives_the_motion_and_the_points():
     frames, camera = textured_drive()
-    field = jacoflow.estimate(frames, method="windowed", window_sigma=4.0)
+    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))
     found, points = motion3d.estimate_field_motion(field, camera, robust=False)
     assert len(points) == len(found.inv_depth) >= 12
     assert np.diff(np.unique(points[:, 0])).min() >= max(8, 2 * field.correlation_length) - 1
@@ -45,7 +45,7 @@ def test_a_field_gives_the_motion_and_the_points():
 
 def test_a_field_has_a_map_of_times_to_contact():
     frames, camera = textured_drive()
-    field = jacoflow.estimate(frames, method="windowed", window_sigma=4.0)
+    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))
     found, _ = motion3d.estimate_field_motion(field, camera, robust=False)
     contact, deviation, residual = motion3d.time_to_contact_map(field, found, camera)
     assert contact.shape == deviation.shape == residual.shape == field.shape
@@ -67,7 +67,7 @@ def test_a_field_has_a_map_of_times_to_contact():
 @pytest.mark.parametrize("form", [{"robust": False}, {"patches": 24}])
 def test_a_map_has_the_errors_that_all_flow_has_in_common(common, form):
     frames, camera = textured_drive()
-    field = jacoflow.estimate(frames, method="windowed", window_sigma=4.0)
+    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))
     found, points = motion3d.estimate_field_motion(field, camera, **form, **common)
     x, y = np.round(points).astype(int).T
     _, deviation, _ = motion3d.time_to_contact_map(field, found, camera)
@@ -83,7 +83,7 @@ def test_a_map_has_the_errors_that_all_flow_has_in_common(common, form):
 
 def test_options_that_a_field_does_not_have_are_refused_by_name():
     frames, camera = textured_drive()
-    field = jacoflow.estimate(frames, method="windowed", window_sigma=4.0)
+    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))
     whole, _ = motion3d.estimate_field_motion(field, camera, robust=False)
     box = (20, 10, 60, 50)
     for wrong, words in (
@@ -115,7 +115,7 @@ def test_options_that_a_field_does_not_have_are_refused_by_name():
 def test_the_rotation_of_a_scene_is_that_of_a_thing_in_it():
     """As the prior that says the same by hand."""
     frames, camera = textured_drive()
-    field = jacoflow.estimate(frames, method="windowed", window_sigma=4.0)
+    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))
     whole, _ = motion3d.estimate_field_motion(field, camera, robust=False)
     box = (20, 10, 60, 50)
     by_scene, _ = motion3d.estimate_field_motion(field, camera, region=box, scene=whole, object_rotation_std=0.002, robust=False)
@@ -160,7 +160,7 @@ def test_patches_of_a_field_give_the_motion_and_say_how_surely():
     spreads: dict[int, list[float]] = {64: [], 96: []}
     for seed in range(20):
         frames, u, w = two_views(seed, 4.0)
-        field = jacoflow.estimate(frames, preset="fast")
+        field = jacoflow.estimate(frames, method=jacoflow.CoarseToFine(preset="fast"))
         for size, most in ((64, 15), (96, 6)):
             found, middles = motion3d.estimate_field_motion(field, CAMERA, patches=size)
             assert most - 4 <= len(middles) <= most and found.surface_slopes is not None and found.surface_slopes.shape == middles.shape
@@ -177,7 +177,7 @@ def test_patches_of_a_field_give_the_motion_and_say_how_surely():
 
 def test_two_patches_of_a_field_determine_a_motion():
     frames, u, _ = two_views(3, 1.0)
-    field = jacoflow.estimate(frames, preset="fast")
+    field = jacoflow.estimate(frames, method=jacoflow.CoarseToFine(preset="fast"))
     found, middles = motion3d.estimate_field_motion(field, CAMERA, patches=150)
     assert len(middles) == 2 and found.status == "few_points" and found.inv_depth.shape == (2,)
     assert_array_equal(middles, [[84.5, 119.5], [234.5, 119.5]])

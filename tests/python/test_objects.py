@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from grouped_options import grouped
 import jacoflow
 
 SIZE = 200
@@ -30,7 +31,7 @@ def square(side, before, after, *, background=(0, 0), seed=0):
 
 def error(frames, side, after, **options):
     """Mean end-point error, px, of the square, 4 px within its edge."""
-    field = jacoflow.estimate(frames, covariance=False, **options)
+    field = jacoflow.estimate(frames, covariance=False, **grouped(**options))
     middle = slice(SIZE // 2 - side // 2 + 4, SIZE // 2 + side // 2 - 3)
     return float(np.hypot(field.u - after[0], field.v - after[1])[middle, middle].mean())
 

@@ -32,7 +32,7 @@ def test_intensity_gain_never_changes_the_flow(seed, method, gain):
 def test_smoothness_is_relative_to_the_gradient(seed, smoothness, gain):
     frames = pictures(seed)
     one, other = (
-        jacoflow.estimate(list(frames * factor), method="horn_schunck", smoothness=smoothness) for factor in (1.0, gain)
+        jacoflow.estimate(list(frames * factor), method=jacoflow.HornSchunck(smoothness=smoothness)) for factor in (1.0, gain)
     )
     assert (other.status == one.status).all() and one.status[18, 20] == jacoflow.Status.OK
     assert_allclose(other.flow, one.flow, rtol=1e-4, atol=1e-5)
@@ -114,7 +114,7 @@ def test_any_size_and_any_noise_give_arrays_of_the_right_shape(height, width, co
 @example(8, 3, "augmented", 0)
 def test_the_filter_survives_any_noise(height, width, form, seed):
     frames = (np.random.default_rng(seed).random((4, height, width)) * 255).astype(np.uint8)
-    flow_filter = jacoflow.FlowFilter(form=form)
+    flow_filter = jacoflow.FlowFilter(profile=jacoflow.FilterProfile(form=form))
     for frame in frames:
         field = flow_filter.push(frame)
     assert field.shape == (height, width)

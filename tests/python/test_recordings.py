@@ -96,7 +96,7 @@ def test_estimates_of_a_steady_flow_agree_within_their_deviations(count):
 
 def test_fusion_of_a_steady_flow_agrees_with_each_estimate():
     frames = steady_flow()
-    options = {"method": "coarse_to_fine", "time_scheme": "pair"}
+    options = {"method": jacoflow.CoarseToFine(time_scheme="pair")}
     plain = jacoflow.estimate(np.stack(frames), **options)
     fused = jacoflow.estimate(np.stack(frames), temporal="recursive", **options)
     inner = np.s_[16:-16, 16:-16]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from grouped_options import grouped
 import jacoflow
 from jacoflow import FlowEstimator, Status, scenes
 
@@ -28,7 +29,7 @@ def arrays(field):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_stream_is_the_stack_and_pickles_in_between(frames, method):
-    options = {"method": method, "temporal": "recursive", "forgetting": 0.9}
+    options = {"method": method, "temporal": jacoflow.Recursive(forgetting=0.9)}
     stack = jacoflow.estimate(frames, **options, threads=1)
     estimator = FlowEstimator(**options, threads=2)
     got = []
@@ -41,7 +42,7 @@ def test_a_stream_is_the_stack_and_pickles_in_between(frames, method):
     for one, other in zip(got, stack, strict=True):
         for a, b in zip(arrays(one), arrays(other), strict=True):
             assert_array_equal(a, b)
-    assert estimator.options["temporal"] == "recursive"
+    assert estimator.options["temporal"] == options["temporal"]
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -60,12 +61,12 @@ def test_it_starts_with_the_first_estimate_and_gets_surer(frames, method):
 
 def test_forgetting_everything_is_no_memory(frames):
     plain = jacoflow.estimate(frames, precision="float64")
-    fused = jacoflow.estimate(frames, precision="float64", temporal="recursive", forgetting=1e-9)
+    fused = jacoflow.estimate(frames, precision="float64", temporal=jacoflow.Recursive(forgetting=1e-9))
     assert_allclose(fused.flow, plain.flow, atol=1e-6)
 
 
 def test_precisions_agree_and_units_follow_the_pixel_pitch(frames):
-    options = {"temporal": "recursive", "forgetting": 1.0}
+    options = {"temporal": jacoflow.Recursive(forgetting=1.0)}
     double = jacoflow.estimate(frames, precision="float64", **options)
     single = jacoflow.estimate(frames, precision="float32", **options)
     close = np.abs(double.flow - single.flow)[double.valid] < 0.02 * double.std("u")[double.valid][:, None]
@@ -77,7 +78,7 @@ def test_precisions_agree_and_units_follow_the_pixel_pitch(frames):
 
 def test_points_are_those_of_the_whole(frames):
     whole = jacoflow.estimate(frames, temporal="recursive")
-    points = jacoflow.estimate(frames, temporal="recursive", points=[[30, 20], [24, 31]])
+    points = jacoflow.estimate(frames, temporal="recursive", grid=jacoflow.SamplingGrid(points=[[30, 20], [24, 31]]))
     assert_allclose(points.flow[-1], whole.flow[-1][[20, 31], [30, 24]], rtol=1e-4, atol=1e-6)
 
 
@@ -111,9 +112,8 @@ def test_reset_forgets(frames):
     ("options", "words"),
     [
         ({"temporal": "kalman"}, "temporal: expected none or recursive"),
-        ({"forgetting": 0.9}, "forgetting"),
-        ({"temporal": "recursive", "forgetting": 1.5}, "forgetting: expected a factor above 0"),
-        ({"temporal": "recursive", "forgetting": float("nan")}, "forgetting"),
+        ({"forgetting": 1.5}, "forgetting: expected a factor above 0"),
+        ({"forgetting": float("nan")}, "forgetting"),
         ({"temporal": "recursive", "covariance": False}, "covariance"),
         ({"temporal": "recursive", "method": "lucas_kanade"}, "method.*affine"),
         ({"temporal": "recursive", "method": "instantaneous", "model": "translational"}, "method.*translational"),
@@ -121,7 +121,7 @@ def test_reset_forgets(frames):
 )
 def test_what_cannot_be_is_said_before_the_first_frame(options, words):
     with pytest.raises(ValueError, match=words):
-        FlowEstimator(**options)
+        FlowEstimator(**grouped(**options))
 
 
 def test_bias_that_does_not_average_out_is_told():

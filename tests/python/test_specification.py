@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from grouped_options import grouped
 import jacoflow
 from jacoflow import scenes
 
@@ -77,29 +78,27 @@ def test_the_scene_is_the_patents():
 
 @pytest.mark.parametrize("start", [0.0, 37.0, 250.0])
 def test_clean_backward_differences(start):
-    field = jacoflow.estimate(
-        ramp(12, start), method="instantaneous", time_scheme="backward", points=[[MARGIN, MARGIN]]
-    )
+    field = jacoflow.estimate(ramp(12, start), method=jacoflow.Instantaneous(time_scheme="backward"), grid=jacoflow.SamplingGrid(points=[[MARGIN, MARGIN]]))
     expected = [-2.542467, 1.845170, -4.934396e-4, 3.1410759e-2, -3.1410759e-2, -4.934396e-4]
     assert_allclose(watched(field), np.tile(expected, (10, 1)), atol=1e-6)
 
 
 def test_clean_central_differences():
-    field = jacoflow.estimate(ramp(3), method="instantaneous", points=[[MARGIN, MARGIN]])
+    field = jacoflow.estimate(ramp(3), method="instantaneous", grid=jacoflow.SamplingGrid(points=[[MARGIN, MARGIN]]))
     assert field.frame_index == 1
     assert_allclose(watched(field), TRUTH[None], atol=5e-4)
 
 
 def test_instantaneous_estimate_of_measured_frames_is_useless(sequence):
     """The patent's figure 3."""
-    field = jacoflow.estimate(sequence, method="instantaneous", time_scheme="backward", points=[[MARGIN, MARGIN]])
+    field = jacoflow.estimate(sequence, method=jacoflow.Instantaneous(time_scheme="backward"), grid=jacoflow.SamplingGrid(points=[[MARGIN, MARGIN]]))
     error = np.linalg.norm(watched(field)[:, :2] - TRUTH[:2], axis=1)
     assert 1.5 < np.nanmedian(error) < 4
     assert (error < 0.25).sum() < 0.15 * 400
 
 
 def filtered(frames, **options):
-    flow_filter = jacoflow.FlowFilter(points=[[MARGIN, MARGIN]], **options)
+    flow_filter = jacoflow.FlowFilter(**grouped(points=[[MARGIN, MARGIN]], **options))
     fields = [flow_filter.push(frame) for frame in frames]
     assert flow_filter.repairs == 0
     return np.stack([watched(field) for field in fields])
@@ -134,7 +133,7 @@ def test_augmented_filter_is_better_than_the_non_augmented_one(sequence, augment
 
 
 def test_first_states_of_the_augmented_filter(sequence):
-    flow_filter = jacoflow.FlowFilter(points=[[MARGIN, MARGIN]])
+    flow_filter = jacoflow.FlowFilter(grid=jacoflow.SamplingGrid(points=[[MARGIN, MARGIN]]))
     flow_filter.push(sequence[0])
     state = flow_filter.state[0]
     assert_allclose(state[:3], [139.52981, 0.20018528, 0], atol=1e-5)
@@ -197,7 +196,7 @@ def test_non_augmented_filter_equals_filterpy_for_400_frames(sequence):
     )
     for each in (reference, generic):
         each.Q, each.R = Q, 1e-3 * np.eye(9)
-    dense = jacoflow.FlowFilter(points=[[MARGIN, MARGIN]], form="non_augmented")
+    dense = jacoflow.FlowFilter(grid=jacoflow.SamplingGrid(points=[[MARGIN, MARGIN]]), profile=jacoflow.FilterProfile(form="non_augmented"))
     for frame in sequence:
         z = frame[MARGIN - 1 : MARGIN + 2, MARGIN - 1 : MARGIN + 2].ravel()
         reference.predict()

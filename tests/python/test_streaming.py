@@ -10,6 +10,7 @@ import pytest
 from conftest import METHODS
 from numpy.testing import assert_array_equal
 
+from grouped_options import grouped
 import jacoflow
 from jacoflow import FlowEstimator, FlowFilter, scenes
 
@@ -49,13 +50,13 @@ def test_lists_and_arrays(frames):
 
 
 def test_backward_fields_belong_to_the_newest_frame(frames):
-    field = jacoflow.estimate(frames, method="windowed", time_scheme="backward")
+    field = jacoflow.estimate(frames, method=jacoflow.Windowed(time_scheme="backward"))
     assert [each.frame_index for each in field] == [2, 3, 4, 5]
 
 
 def test_preparation_is_done_on_the_way(frames):
     prepared = np.stack([jacoflow.smooth(jacoflow.quantise(frame), 1.5) for frame in frames])
-    one = jacoflow.estimate(frames, method="lucas_kanade", quantise=1.0, smooth=1.5)
+    one = jacoflow.estimate(frames, method="lucas_kanade", preprocess=jacoflow.Preprocess(quantise=1.0, smooth=1.5))
     other = jacoflow.estimate(prepared, method="lucas_kanade")
     assert_array_equal(one.flow, other.flow)
 
@@ -64,10 +65,10 @@ def test_colour_is_luminance_on_request(frames):
     grey = np.clip(np.round(frames), 0, 255).astype(np.uint8)
     colour = np.stack([grey, grey, grey, np.full_like(grey, 255)], axis=-1)
     expected = jacoflow.estimate(grey)
-    assert_array_equal(jacoflow.estimate(colour, colour="luminance").flow, expected.flow)
-    listed = jacoflow.estimate([frame[..., :3] for frame in colour], colour="luminance")
+    assert_array_equal(jacoflow.estimate(colour, preprocess=jacoflow.Preprocess(colour="luminance")).flow, expected.flow)
+    listed = jacoflow.estimate([frame[..., :3] for frame in colour], preprocess=jacoflow.Preprocess(colour="luminance"))
     assert_array_equal(listed.flow, expected.flow)
-    estimator = FlowEstimator(colour="luminance")
+    estimator = FlowEstimator(preprocess=jacoflow.Preprocess(colour="luminance"))
     assert_array_equal([estimator.push(frame) for frame in colour][2].flow, expected[0].flow)
     assert jacoflow.luminance(colour[0]).dtype == np.uint8
 
@@ -88,7 +89,7 @@ def test_reset_begins_anew(frames):
 def test_estimator_pickles_in_mid_stream(frames, dtype):
     frames = np.clip(np.round(frames), 0, 255).astype(dtype)
     mask = np.ones((32, 40), bool)
-    one = FlowEstimator(points=np.array([[4, 5], [20, 11]]), mask=mask, smooth=1.0, fps=50.0, diagnostics=True)
+    one = FlowEstimator(grid=jacoflow.SamplingGrid(points=np.array([[4, 5], [20, 11]])), mask=mask, preprocess=jacoflow.Preprocess(smooth=1.0), fps=50.0, diagnostics=True)
     for frame in frames[:4]:
         one.push(frame)
     mask[:] = False
@@ -105,7 +106,7 @@ def test_estimator_pickles_in_mid_stream(frames, dtype):
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_filter_resumes_bit_for_bit(frames, form, precision, tmp_path):
-    options = {"form": form, "precision": precision, "R": 0.25, "neighbourhood": (5, 5), "stride": 3, "transition": "exact"}
+    options = grouped(form=form, precision=precision, R=0.25, neighbourhood=(5, 5), stride=3, transition="exact")
     one = FlowFilter(**options)
     for frame in frames[:3]:
         one.push(frame)
@@ -132,7 +133,7 @@ def test_a_saved_filter_is_taken_up_only_where_it_fits(frames, tmp_path):
     one.push(np.clip(frames[0], 0, 255).astype(np.uint8))
     one.save(tmp_path / "state.npz")
     with pytest.raises(ValueError, match="same options"):
-        FlowFilter(R=0.5).load(tmp_path / "state.npz")
+        FlowFilter(profile=jacoflow.FilterProfile(R=0.5)).load(tmp_path / "state.npz")
     other = FlowFilter()
     other.load(tmp_path / "state.npz")
     with pytest.raises(ValueError, match="full scale"):
@@ -156,11 +157,11 @@ def test_a_saved_filter_is_taken_up_only_where_it_fits(frames, tmp_path):
 
 
 def test_fast_is_the_25_points_with_the_motion_first(frames):
-    options = {"precision": "float64", "points": [[12, 10], [20, 14]]}
+    options = {"precision": "float64", "grid": jacoflow.SamplingGrid(points=[[12, 10], [20, 14]])}
     fast, same, default = (
-        FlowFilter(form="fast", **options),
-        FlowFilter(form="non_augmented", square_root="motion_first", **options),
-        FlowFilter(form="non_augmented", **options),
+        FlowFilter(profile=jacoflow.FilterProfile(form="fast"), **options),
+        FlowFilter(profile=jacoflow.FilterProfile(form="non_augmented", square_root="motion_first"), **options),
+        FlowFilter(profile=jacoflow.FilterProfile(form="non_augmented"), **options),
     )
     for frame in frames:
         for one in (fast, same, default):
@@ -168,9 +169,9 @@ def test_fast_is_the_25_points_with_the_motion_first(frames):
     np.testing.assert_allclose(fast.state, same.state, rtol=1e-8, atol=1e-8)
     assert not np.allclose(fast.state, default.state, rtol=1e-8, atol=1e-8)
     with pytest.raises(ValueError, match="square_root"):
-        FlowFilter(form="fast", square_root="brightness_first").push(frames[0])
+        FlowFilter(profile=jacoflow.FilterProfile(form="fast", square_root="brightness_first")).push(frames[0])
     with pytest.raises(ValueError, match="square_root"):
-        FlowFilter(square_root="upwards")
+        FlowFilter(profile=jacoflow.FilterProfile(square_root="upwards"))
 
 
 def test_filter_grey_levels_do_not_depend_on_the_sample_type(frames):
@@ -182,7 +183,7 @@ def test_filter_grey_levels_do_not_depend_on_the_sample_type(frames):
         (narrow.astype(np.float32), {}),
         (narrow.astype(np.float32) / 255, {"full_scale": 1.0}),
     ):
-        flow_filter = FlowFilter(profile="measured", precision="float64", **options)
+        flow_filter = FlowFilter(**grouped(profile="measured", precision="float64", **options))
         fields.append([flow_filter.push(frame) for frame in sequence][-1])
     for field in fields[1:]:
         np.testing.assert_allclose(field.flow, fields[0].flow, rtol=1e-3, atol=1e-4)

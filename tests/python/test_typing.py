@@ -17,7 +17,7 @@ def frames() -> NDArray[np.float64]:
 
 def test_estimate() -> None:
     stack = frames()
-    field = jacoflow.estimate(list(stack[:3]), method="windowed", fps=25.0, region=(2, 2, 20, 20), stride=2)
+    field = jacoflow.estimate(list(stack[:3]), method="windowed", fps=25.0, grid=jacoflow.SamplingGrid(region=(2, 2, 20, 20), stride=2))
     assert_type(field, FlowField)
     assert_type(field.frame_index, int)
     assert_type(field.status, NDArray[np.uint8])
@@ -30,18 +30,16 @@ def test_estimate() -> None:
     covariance = field.covariance
     assert covariance is not None and covariance.shape[-2:] == (6, 6)
     assert Status(int(field.status[5, 5])) is Status.OK
-    points = jacoflow.estimate(
-        stack, method="windowed", points=[(3, 4), (5, 6)], neighbourhood=[(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)]
-    )
+    points = jacoflow.estimate(stack, method=jacoflow.Windowed(neighbourhood=[(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)]), grid=jacoflow.SamplingGrid(points=[(3, 4), (5, 6)]))
     assert points.shape == (2, 2)
 
 
 def test_streams(tmp_path: Path) -> None:
-    assert_type(FlowEstimator(temporal="recursive", forgetting=0.9).frames_needed, int)
-    estimator = FlowEstimator(method="lucas_kanade", window_sigma=3.0)
+    assert_type(FlowEstimator(temporal=jacoflow.Recursive(forgetting=0.9)).frames_needed, int)
+    estimator = FlowEstimator(method=jacoflow.LucasKanade(window_sigma=3.0))
     results = [estimator.push(frame) for frame in frames()]
     assert_type(results, list[FlowField | None])
-    flow_filter = FlowFilter(profile="measured", Q=np.full(12, 1e-4), form="fast")
+    flow_filter = FlowFilter(profile=jacoflow.FilterProfile("measured", Q=np.full(12, 1e-4), form="fast"))
     fields = [flow_filter.push(frame) for frame in frames()]
     assert_type(fields, list[FlowField])
     assert_type(flow_filter.repairs, int)

@@ -1,18 +1,7 @@
-//! How the work is done and what is told about it.
+//! Threads, instruction set, precision, and messages.
 
-use clap::{Args, ValueEnum};
-
-/// The precision of the computation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Precision {
-    /// Single for 8-bit, 16-bit and single-precision frames, double for double-precision frames and for
-    /// filters whose measurement noise is below 0.25
-    Auto,
-    /// 32-bit floating point
-    Single,
-    /// 64-bit floating point
-    Double,
-}
+use crate::types::Precision;
+use clap::Args;
 
 /// Threads.
 #[derive(Debug, Clone, Args)]
@@ -32,15 +21,20 @@ pub struct ComputeArguments {
     /// Instruction set: scalar, avx2 or avx512 [default: JACOFLOW_SIMD, else the best of this processor]
     #[arg(long, value_name = "LEVEL")]
     pub simd: Option<String>,
-    /// Precision of the computation
-    #[arg(long, value_enum, value_name = "WHICH", default_value = "auto")]
+    /// Precision of the computation: float32, float64, or auto (float32 for 8-bit, 16-bit and float32 frames,
+    /// float64 for float64 frames and for filters whose measurement noise is below 0.25)
+    #[arg(long, value_name = "WHICH", default_value = "auto", value_parser = parse_precision)]
     pub precision: Precision,
 }
 
-/// What is told on the terminal.
+fn parse_precision(text: &str) -> Result<Precision, String> {
+    Precision::parse(text).map_err(|error| error.to_string())
+}
+
+/// Messages on the terminal.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Messages")]
-pub struct TellArguments {
+pub struct MessageArguments {
     /// Print exactly one JSON object, the summary, on standard output
     #[arg(long)]
     pub json: bool,

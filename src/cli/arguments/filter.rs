@@ -2,7 +2,7 @@
 
 use super::method::{rectangle, word};
 use super::{parse_pair, parse_positive, parse_size};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::temporal::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
 use clap::Args;
 use serde_json::{Value, json};
@@ -81,11 +81,7 @@ impl FilterArguments {
     /// # Errors
     /// [`Error::Argument`] naming the option with an unknown word.
     pub fn options(&self, dtype: &str) -> Result<FlowFilterOptions> {
-        let mut options = match self.profile.as_str() {
-            "patent" => FlowFilterOptions::patent(),
-            "measured" => FlowFilterOptions::measured(),
-            other => return Err(Error::argument("profile", "patent or measured", other)),
-        };
+        let mut options = FlowFilterOptions::profile(&self.profile)?;
         if let Some(form) = &self.form {
             options.form = FilterForm::parse(&word(form))?;
         }

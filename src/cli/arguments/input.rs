@@ -1,6 +1,7 @@
 //! Where frames come from and what is done to them first.
 
 use super::{parse_not_negative, parse_positive, parse_rate};
+use crate::error::{Error, Result};
 use crate::io::{Colour, OpenOptions};
 use crate::pipeline::Numbering;
 use clap::Args;
@@ -13,10 +14,10 @@ pub struct SelectionArguments {
     pub luminance: bool,
     /// Index of the first frame to use
     #[arg(long, value_name = "N", default_value_t = 0)]
-    pub first: usize,
-    /// Use at most this many frames
+    pub start: usize,
+    /// Index after the last frame to use [default: all frames]
     #[arg(long, value_name = "N")]
-    pub limit: Option<usize>,
+    pub stop: Option<usize>,
     /// Use every N-th frame
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
     pub step: usize,
@@ -27,18 +28,29 @@ impl SelectionArguments {
     pub fn options(&self) -> OpenOptions {
         OpenOptions {
             colour: if self.luminance { Colour::Luminance } else { Colour::Error },
-            first: self.first,
-            limit: self.limit,
+            start: self.start,
+            stop: self.stop,
             step: self.step,
             ..OpenOptions::default()
         }
     }
 
+    /// Refuses a range of frames that holds fewer than `min` of `what`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `stop`.
+    pub fn check_count(&self, min: usize, what: &str) -> Result<()> {
+        match self.stop.map(|stop| stop.saturating_sub(self.start).div_ceil(self.step)) {
+            Some(count) if count < min => Err(Error::argument("stop", format!("at least {min} {what}"), count)),
+            _ => Ok(()),
+        }
+    }
+
     /// Which frames of the input these are: `given` frames per second of the input, or those that the source
-    /// tells of the frames it delivers.
+    /// states for the frames that it delivers.
     pub fn numbering(&self, given: Option<f64>, delivered: Option<f64>) -> Numbering {
         let rate = given.or_else(|| delivered.map(|rate| rate * self.step as f64));
-        Numbering { first: self.first, step: self.step, rate }
+        Numbering { start: self.start, step: self.step, rate }
     }
 }
 

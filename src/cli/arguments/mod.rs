@@ -2,22 +2,22 @@
 
 mod compute;
 mod filter;
+mod grid;
 mod input;
 mod method;
 mod output;
 mod particle_track;
-mod sites;
 mod stereo_track;
 mod track;
 mod views;
 
-pub use compute::{ComputeArguments, Precision, TellArguments, ThreadArguments};
+pub use compute::{ComputeArguments, MessageArguments, ThreadArguments};
 pub use filter::{FilterArguments, describe_filter};
+pub use grid::GridArguments;
 pub use input::{InputArguments, SelectionArguments};
 pub use method::MethodArguments;
 pub use output::OutputArguments;
 pub use particle_track::ParticleTrackerArguments;
-pub use sites::SiteArguments;
 pub use stereo_track::StereoTrackerArguments;
 pub use track::{TargetArguments, TrackerArguments};
 pub use views::{LayoutArguments, SearchArguments};

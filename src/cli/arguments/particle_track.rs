@@ -28,8 +28,8 @@ pub struct ParticleTrackerArguments {
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
     /// Draw the foreground map of every frame, white where it is not background: a folder for
-    /// foreground_000000.png, ..., or a film *.y4m
-    #[arg(long, value_name = "FOLDER|FILM")]
+    /// foreground_000000.png, ..., or a sequence *.y4m
+    #[arg(long, value_name = "FOLDER|Y4M")]
     pub foreground: Option<PathBuf>,
 }
 
@@ -78,7 +78,7 @@ impl ParticleTrackerArguments {
             (None, []) => Err(Error::argument("box", "a --box for each target, or --boxes FILE", "none")),
             (None, given) => {
                 let start =
-                    |(id, bounds): (u64, &TargetBox)| TargetStart { frame: numbering.first, id, bounds: *bounds };
+                    |(id, bounds): (u64, &TargetBox)| TargetStart { frame: numbering.start, id, bounds: *bounds };
                 Ok((1..).zip(given).map(start).collect())
             }
             (Some(path), []) => starts_in(path, numbering, frames),
@@ -93,7 +93,7 @@ impl ParticleTrackerArguments {
 /// Every target of a file at its first line in a frame that is read.
 fn starts_in(path: &Path, numbering: Numbering, frames: Option<usize>) -> Result<Vec<TargetStart>> {
     let is_read = |frame: usize| {
-        let after = frame.checked_sub(numbering.first).filter(|after| after.is_multiple_of(numbering.step));
+        let after = frame.checked_sub(numbering.start).filter(|after| after.is_multiple_of(numbering.step));
         after.is_some_and(|after| frames.is_none_or(|frames| after / numbering.step < frames))
     };
     let mut starts = BTreeMap::<u64, TargetStart>::new();
@@ -137,10 +137,10 @@ mod tests {
         let all = Numbering::default();
         // Pixel 1 of the file is pixel 0 here and reaches from -1/2.
         assert_eq!(starts(all, None).unwrap(), [(4, 5, 7.5), (7, 1, 1.0), (9, 0, 6.5)]);
-        let every_second = Numbering { first: 0, step: 2, rate: None };
+        let every_second = Numbering { start: 0, step: 2, rate: None };
         assert_eq!(starts(every_second, None).unwrap(), [(7, 2, -0.5), (9, 0, 6.5)]);
         assert_eq!(starts(all, Some(1)).unwrap(), [(9, 0, 6.5)]);
-        let late = starts(Numbering { first: 6, step: 1, rate: None }, None).unwrap_err().to_string();
+        let late = starts(Numbering { start: 6, step: 1, rate: None }, None).unwrap_err().to_string();
         assert!(late.starts_with("boxes: expected"), "{late}");
         std::fs::write(&path, "1,-1,1,1,5,6,1\n").unwrap();
         assert!(starts(all, None).unwrap_err().to_string().contains("number of at least 0"));
@@ -149,7 +149,7 @@ mod tests {
     #[test]
     fn boxes_come_from_one_place() {
         let bounds = TargetBox { x: 1.0, y: 2.0, width: 3.0, height: 4.0 };
-        let numbering = Numbering { first: 5, step: 1, rate: None };
+        let numbering = Numbering { start: 5, step: 1, rate: None };
         let starts = arguments(None).starts(&[bounds, bounds], numbering, None).unwrap();
         assert_eq!(starts.iter().map(|start| (start.id, start.frame)).collect::<Vec<_>>(), [(1, 5), (2, 5)]);
         let none = arguments(None).starts(&[], numbering, None).unwrap_err().to_string();

@@ -37,8 +37,8 @@ pub struct StereoTrackerArguments {
     #[arg(long, value_name = "FILE")]
     pub times: Option<PathBuf>,
     /// Draw disparities over every left view, blue far to red near: a folder for stereo_000000.png, ..., or a
-    /// film *.y4m
-    #[arg(long, value_name = "FOLDER|FILM")]
+    /// sequence *.y4m
+    #[arg(long, value_name = "FOLDER|Y4M")]
     pub disparity_overlay: Option<PathBuf>,
     /// Draw the graph of all clusters over time: a .png file
     #[arg(long, value_name = "FILE")]
@@ -94,7 +94,7 @@ impl StereoTrackerArguments {
 }
 
 impl StereoTrackerArguments {
-    /// When the pairs were recorded, where that is told.
+    /// When the pairs were recorded, if given.
     ///
     /// # Errors
     /// A file that cannot be read or has other lines; [`Error::Argument`] named `times` for times that do not

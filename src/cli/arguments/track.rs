@@ -50,7 +50,7 @@ pub struct TrackerArguments {
     /// Seed of the random numbers (stereo, particle) [default: 0]
     #[arg(long, value_name = "N")]
     pub random_state: Option<u64>,
-    /// What the target's picture does besides moving (gradient) [default: similarity]
+    /// How the target's picture deforms (gradient) [default: similarity]
     #[arg(long, value_enum, value_name = "NAME")]
     pub model: Option<ModelWord>,
     /// What the camera does (gradient) [default: auto]

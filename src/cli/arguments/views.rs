@@ -33,7 +33,7 @@ pub struct LayoutArguments {
 }
 
 impl LayoutArguments {
-    /// Opens the pairs of views, and tells which of the input they are.
+    /// Opens the pairs of views; also returns their numbering in the input.
     ///
     /// # Errors
     /// Those of [`ViewPairs::open`].

@@ -24,7 +24,7 @@ impl TrackCommand {
         self.refuse(self.tracker.random_state.map(|_| "random_state"), "stereo or particle")?;
         let options = self.tracker.gradient()?;
         let threads = Threads::new(self.threads.threads)?;
-        let wanted = self.output.wanted(self.tell.json, self.output.overlay.is_some())?;
+        let wanted = self.output.wanted(self.messages.json, self.output.overlay.is_some())?;
         let checked = |place: &&PathBuf| !self.output.force && !self.output.is_in_new_folder(place);
         if let Some(place) = self.output.overlay.as_ref().filter(checked) {
             Overlays::check(place)?;
@@ -44,7 +44,7 @@ impl TrackCommand {
             Ok(Begun { trackers, sinks: self.sinks(&wanted, rate)? })
         };
         let failure = {
-            let bar = Bar::new(watch, "track", self.tell.quiet);
+            let bar = Bar::new(watch, "track", self.messages.quiet);
             run.run(opened.source, Box::new(begin), &bar).err()
         };
         Ok(self.report(&run.summary(), failure, details))
@@ -56,7 +56,7 @@ impl TrackCommand {
         let mut sinks: Vec<Box<dyn TrackSink>> = Vec::new();
         if let Some(path) = &self.output.overlay {
             let drawing = TrackOverlay { enlargement: self.output.enlarge, ..TrackOverlay::default() };
-            sinks.push(Box::new(Overlays::create(path, drawing, TrackOutputArguments::film_rate(rate))?));
+            sinks.push(Box::new(Overlays::create(path, drawing, TrackOutputArguments::frame_rate(rate))?));
         }
         for (target, format) in wanted {
             sinks.push(Box::new(TrackRows::create(target, *format)?));

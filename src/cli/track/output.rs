@@ -5,8 +5,8 @@ use crate::pipeline::{TableTarget, TextFormat, check_target, is_device, is_folde
 use clap::Args;
 use std::path::{Path, PathBuf};
 
-/// Frames per second of a film where the input does not tell.
-const FILM_RATE: f64 = 25.0;
+/// Frames per second of a drawn sequence where the input has no rate.
+const DEFAULT_FRAME_RATE: f64 = 25.0;
 
 /// Texts and pictures.
 #[derive(Debug, Args)]
@@ -20,9 +20,9 @@ pub struct TrackOutputArguments {
     /// (the graph) [default: by the file's name, else csv]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub format: Vec<String>,
-    /// Draw the targets, or clusters, over every frame: a folder for track_000000.png, ..., or a film by the
-    /// name *.y4m
-    #[arg(long, value_name = "FOLDER|FILM")]
+    /// Draw the targets, or clusters, over every frame: a folder for track_000000.png, ..., or a sequence by
+    /// the name *.y4m
+    #[arg(long, value_name = "FOLDER|Y4M")]
     pub overlay: Option<PathBuf>,
     /// Enlarge the drawn pictures N times, for small targets
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=16))]
@@ -36,9 +36,9 @@ pub struct TrackOutputArguments {
 pub type Wanted<F> = (TableTarget, F);
 
 impl TrackOutputArguments {
-    /// Frames per second of films.
-    pub fn film_rate(rate: Option<f64>) -> f64 {
-        rate.unwrap_or(FILM_RATE)
+    /// Frames per second of sequences.
+    pub fn frame_rate(rate: Option<f64>) -> f64 {
+        rate.unwrap_or(DEFAULT_FRAME_RATE)
     }
 
     /// Makes the folder that texts go to.
@@ -56,13 +56,13 @@ impl TrackOutputArguments {
         folder.is_some_and(|folder| path.parent() == Some(folder))
     }
 
-    /// The texts to write, checked before any work is done. `otherwise`: the summary or pictures are wanted,
-    /// so that no text need be; `json`: standard output is for the summary.
-    pub fn wanted<F: TextFormat>(&self, json: bool, otherwise: bool) -> Result<Vec<Wanted<F>>> {
+    /// The texts to write, checked before any work is done. `has_other`: the summary or pictures are wanted,
+    /// so that no text is needed; `json`: standard output is for the summary.
+    pub fn wanted<F: TextFormat>(&self, json: bool, has_other: bool) -> Result<Vec<Wanted<F>>> {
         let formats: Vec<F> = self.format.iter().map(|name| F::parse(name)).collect::<Result<_>>()?;
         let path = match &self.output {
             Some(path) => path,
-            None if (json || otherwise) && formats.is_empty() => return Ok(Vec::new()),
+            None if (json || has_other) && formats.is_empty() => return Ok(Vec::new()),
             None => Path::new("-"),
         };
         if path == Path::new("-") {
@@ -107,7 +107,7 @@ impl TrackOutputArguments {
         Ok(vec![(TableTarget::File(path.to_path_buf()), by_name)])
     }
 
-    /// The place that a summary tells: what was asked for, or the other name that the file of a run which was
+    /// The place that a summary names: the requested one, or the other name that the file of a run which was
     /// stopped has.
     pub fn place<'a>(&'a self, latest: Option<&'a PathBuf>) -> Option<&'a PathBuf> {
         match (latest, &self.output) {

@@ -42,7 +42,7 @@ impl TrackCommand {
         let mut run = ParticleRun::new(&starts, options, opened.numbering);
         let begin = || self.particle_sinks(&wanted, rate);
         let failure = {
-            let bar = Bar::new(watch, "track", self.tell.quiet);
+            let bar = Bar::new(watch, "track", self.messages.quiet);
             run.run(opened.source, Box::new(begin), &bar).err()
         };
         Ok(self.report(&run.summary(), failure, details))
@@ -69,7 +69,7 @@ impl TrackCommand {
         let given = [(&self.particle.mot, TrackFormat::Mot, "mot"), (&self.particle.csv, TrackFormat::Csv, "csv")];
         let pictures = self.output.overlay.is_some() || self.particle.foreground.is_some();
         let any = given.iter().any(|(path, ..)| path.is_some());
-        let mut wanted = self.output.wanted(self.tell.json, pictures || any)?;
+        let mut wanted = self.output.wanted(self.messages.json, pictures || any)?;
         for (path, format, option) in given {
             let Some(path) = path else { continue };
             check_target(path, self.output.force).map_err(|error| named(error, option))?;
@@ -97,7 +97,7 @@ impl TrackCommand {
     /// Begins what is written; folders are made.
     fn particle_sinks(&self, wanted: &[Wanted<TrackFormat>], rate: Option<f64>) -> Result<Vec<Box<dyn ParticleSink>>> {
         self.output.make_folder()?;
-        let rate = TrackOutputArguments::film_rate(rate);
+        let rate = TrackOutputArguments::frame_rate(rate);
         let mut sinks: Vec<Box<dyn ParticleSink>> = Vec::new();
         if let Some(path) = &self.output.overlay {
             let drawing = TrackOverlay { enlargement: self.output.enlarge, ..TrackOverlay::default() };

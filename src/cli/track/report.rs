@@ -2,7 +2,7 @@
 
 use super::TrackCommand;
 use super::output::files_in_words;
-use crate::cli::report::{Report, tell};
+use crate::cli::report::{Report, print_message};
 use crate::error::Error;
 use crate::pipeline::{TargetSummary, TrackSummary, is_folder};
 use crate::types::TrackStatus;
@@ -15,14 +15,14 @@ impl TrackCommand {
     pub(super) fn report(&self, summary: &TrackSummary, failure: Option<Error>, details: Value) -> Report {
         let interrupted = matches!(failure, Some(Error::Interrupted));
         let output = self.output.place(summary.latest.as_ref());
-        // A film that was stopped has another name, too, or was not begun.
+        // A sequence that was stopped has another name, too, or was not begun.
         let overlay = match &self.output.overlay {
-            Some(film) if !is_folder(film) => summary.latest_of_sinks.first().and_then(Option::as_ref),
+            Some(sequence) if !is_folder(sequence) => summary.latest_of_sinks.first().and_then(Option::as_ref),
             folder => folder.as_ref(),
         };
-        if !self.tell.quiet && (failure.is_none() || interrupted) {
+        if !self.messages.quiet && (failure.is_none() || interrupted) {
             let place = output.or(overlay).or(summary.latest.as_ref());
-            tell(&in_words(summary, place.map(PathBuf::as_path)));
+            print_message(&in_words(summary, place.map(PathBuf::as_path)));
         }
         let mut object = json!({
             "command": "track", "frames": summary.frames, "targets": targets(summary), "files": summary.files,

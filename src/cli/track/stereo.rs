@@ -5,7 +5,7 @@ use super::output::{TrackOutputArguments, Wanted, files_in_words};
 use crate::cli::interrupt::Watch;
 use crate::cli::open::preprocess;
 use crate::cli::progress::Bar;
-use crate::cli::report::{Report, tell};
+use crate::cli::report::{Report, print_message};
 use crate::cli::stereo::rows_doubted;
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
@@ -23,14 +23,12 @@ impl TrackCommand {
     pub(super) fn follow_everything(&self, watch: &Watch) -> Result<Report> {
         self.refuse(self.targets.given().or(self.tracker.given()), "gradient")?;
         self.refuse(self.particle.given(), "particle")?;
-        if let Some(limit) = self.input.selection.limit.filter(|limit| *limit < 2) {
-            return Err(Error::argument("limit", "at least 2 pairs of views to track through", limit));
-        }
+        self.input.selection.check_count(2, "pairs of views to track through")?;
         let threads = Threads::new(self.threads.threads)?;
         let options = self.stereo.options(self.tracker.stereo_mode(), self.tracker.random_state, threads)?;
         let pictures = self.pictures(&options);
         let drawn = !pictures.is_empty() || self.stereo.graph.is_some();
-        let wanted = self.output.wanted(self.tell.json, drawn)?;
+        let wanted = self.output.wanted(self.messages.json, drawn)?;
         self.check_pictures(&pictures)?;
         let (views, numbering) = self.stereo.layout.open(&self.input.input, &self.input.selection, self.input.fps)?;
         let times = self.stereo.times(numbering)?;
@@ -41,15 +39,15 @@ impl TrackCommand {
         let mut run = StereoRun::new(StereoTracker::new(options)?, numbering).with_times(times);
         let begin = || self.stereo_sinks(&wanted, &pictures, threshold, numbering.rate);
         let failure = {
-            let bar = Bar::new(watch, "track", self.tell.quiet);
+            let bar = Bar::new(watch, "track", self.messages.quiet);
             run.run(pairs, Box::new(begin), &bar).err()
         };
         let summary = run.summary();
         let interrupted = matches!(failure, Some(Error::Interrupted));
         let output = self.output.place(summary.latest.as_ref());
-        if !self.tell.quiet && (failure.is_none() || interrupted) {
+        if !self.messages.quiet && (failure.is_none() || interrupted) {
             let drawn = pictures.first().map(|(path, _)| *path).or(self.stereo.graph.as_ref());
-            tell(&in_words(&summary, output.or(drawn).map(PathBuf::as_path)));
+            print_message(&in_words(&summary, output.or(drawn).map(PathBuf::as_path)));
         }
         let object = json!({
             "command": "track", "method": self.tracker.method, "mode": mode, "input": name, "fps": numbering.rate,
@@ -97,7 +95,7 @@ impl TrackCommand {
         self.output.make_folder()?;
         let mut sinks: Vec<Box<dyn StereoSink>> = Vec::new();
         for (path, kind) in pictures {
-            let rate = TrackOutputArguments::film_rate(rate);
+            let rate = TrackOutputArguments::frame_rate(rate);
             sinks.push(Box::new(StereoOverlays::create(path, *kind, self.output.enlarge, rate)?));
         }
         if let Some(path) = &self.stereo.graph {

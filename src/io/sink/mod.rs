@@ -187,8 +187,12 @@ mod tests {
                 assert_eq!(&written_in_colour(&spec(&name), frames).unwrap(), frames, "{name}");
             }
             // Luma and chroma are rounded: at most (1 + 1.772) / 2 levels away before the last rounding.
-            let film = written_in_colour(&spec(&format!("{kind}.y4m")), frames).unwrap();
-            assert!(film[0].dtype() == frames[0].dtype() && apart(&film, frames) <= 1.0, "{}", apart(&film, frames));
+            let sequence = written_in_colour(&spec(&format!("{kind}.y4m")), frames).unwrap();
+            assert!(
+                sequence[0].dtype() == frames[0].dtype() && apart(&sequence, frames) <= 1.0,
+                "{}",
+                apart(&sequence, frames)
+            );
         }
         let float = vec![AnyColourFrame::F64(Frame::filled(2, 2, [0.5, 0.25, -1.0])); 2];
         assert_eq!(written_in_colour(&spec("f.npy"), &float).unwrap(), float);

@@ -183,9 +183,9 @@ mod tests {
 
     fn open(script: &str) -> (tempfile::TempDir, Result<FfmpegSource>) {
         let folder = tempfile::tempdir().unwrap();
-        let film = folder.path().join("-film.mp4");
-        std::fs::write(&film, b"x").unwrap();
-        let source = FfmpegSource::open_with(program(folder.path(), script), &film, Colour::Luminance);
+        let sequence = folder.path().join("-video.mp4");
+        std::fs::write(&sequence, b"x").unwrap();
+        let source = FfmpegSource::open_with(program(folder.path(), script), &sequence, Colour::Luminance);
         (folder, source)
     }
 
@@ -202,11 +202,11 @@ mod tests {
     #[test]
     fn colour_is_asked_for_in_the_coding_that_is_read() {
         let folder = tempfile::tempdir().unwrap();
-        let film = folder.path().join("film.mp4");
-        std::fs::write(&film, b"x").unwrap();
+        let sequence = folder.path().join("video.mp4");
+        std::fs::write(&sequence, b"x").unwrap();
         let script = r#"case "$*" in *out_color_matrix=bt601:out_range=tv,format=yuv444p*) ;; *) exit 1;; esac
             printf 'YUV4MPEG2 W1 H1 F25:1 C444\nFRAME\n\353\200\200'"#;
-        let mut source = FfmpegSource::open_with(program(folder.path(), script), &film, Grey::Error).unwrap();
+        let mut source = FfmpegSource::open_with(program(folder.path(), script), &sequence, Grey::Error).unwrap();
         let white = AnyColourFrame::U8(Frame::filled(1, 1, [255; 3]));
         assert_eq!(source.next_frame().unwrap(), Some(white));
         assert!(source.next_frame().unwrap().is_none());
@@ -216,7 +216,7 @@ mod tests {
     fn failures_carry_the_program_s_words() {
         let (_folder, source) = open("echo 'moov atom not found' >&2; exit 1");
         let message = source.unwrap_err().to_string();
-        assert!(message.contains("moov atom not found") && message.contains("film.mp4"), "{message}");
+        assert!(message.contains("moov atom not found") && message.contains("video.mp4"), "{message}");
         let (_folder, source) = open(r"printf 'YUV4MPEG2 W2 H1 Cmono\nFRAME\nab'; echo 'late trouble' >&2; exit 3");
         let mut source = source.unwrap();
         source.next_frame().unwrap();
@@ -234,14 +234,14 @@ mod tests {
     #[test]
     fn a_missing_program_says_what_to_do() {
         let folder = tempfile::tempdir().unwrap();
-        let film = folder.path().join("film.mp4");
-        std::fs::write(&film, b"x").unwrap();
-        let error = FfmpegSource::open_with("/no/such/ffmpeg", &film, Colour::Luminance).unwrap_err();
+        let sequence = folder.path().join("video.mp4");
+        std::fs::write(&sequence, b"x").unwrap();
+        let error = FfmpegSource::open_with("/no/such/ffmpeg", &sequence, Colour::Luminance).unwrap_err();
         assert!(
-            matches!(&error, Error::Missing(m) if m.contains("Install ffmpeg") && m.contains("film.mp4")),
+            matches!(&error, Error::Missing(m) if m.contains("Install ffmpeg") && m.contains("video.mp4")),
             "{error}"
         );
-        assert!(matches!(FfmpegSource::open("/no/such/film.mp4"), Err(Error::Io { .. })));
+        assert!(matches!(FfmpegSource::open("/no/such/video.mp4"), Err(Error::Io { .. })));
     }
 
     #[test]

@@ -89,7 +89,7 @@ pub struct FilesSource<P = Colour> {
 }
 
 impl<P: ChannelPolicy> FilesSource<P> {
-    /// A source of these image files. They are opened when their frame is asked for; each must have the size
+    /// A source of these image files. They are opened when their frame is read; each must have the size
     /// and sample type of the first.
     ///
     /// # Errors

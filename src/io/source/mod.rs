@@ -23,8 +23,8 @@ use crate::error::{Error, Result};
 use crate::types::{AnyColourFrame, AnyFrame};
 use std::path::Path;
 
-/// How a source is opened: what to do with colour or grey, and the frames wanted, `first`, `first + step`,
-/// ... at most `limit` of them.
+/// How a source is opened: what to do with colour or grey, and the range of frames, `start`,
+/// `start + step`, ... below `stop`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct OpenOptions {
@@ -32,17 +32,17 @@ pub struct OpenOptions {
     pub colour: Colour,
     /// What [`open_colour`] does with grey pictures; default: refuse.
     pub grey: Grey,
-    /// Index of the first frame wanted; default 0.
-    pub first: usize,
-    /// How many frames are wanted at most; default `None`: all.
-    pub limit: Option<usize>,
-    /// Distance between wanted frames; default 1.
+    /// Index of the first frame; default 0.
+    pub start: usize,
+    /// Index after the last frame; default `None`: all frames.
+    pub stop: Option<usize>,
+    /// Distance between frames; default 1.
     pub step: usize,
 }
 
 impl Default for OpenOptions {
     fn default() -> Self {
-        Self { colour: Colour::Error, grey: Grey::Error, first: 0, limit: None, step: 1 }
+        Self { colour: Colour::Error, grey: Grey::Error, start: 0, stop: None, step: 1 }
     }
 }
 
@@ -120,7 +120,7 @@ const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KI
 /// | specification | source |
 /// |---|---|
 /// | `-` | Y4M on standard input |
-/// | `*.y4m` | Y4M file; its luma plane, where the others are grey or luminance is asked for |
+/// | `*.y4m` | Y4M file; its luma plane, where the others are grey or luminance is requested |
 /// | `*.npy` | stack `(T, H, W)` or one frame `(H, W)` of uint8, uint16, float32 or float64; colour `(T, H, W, 3)` |
 /// | `*.txt`, `*.lst` | list of image files, one a line |
 /// | a folder | its PNG, TIFF, BMP, PGM and JPEG files in natural order |
@@ -180,7 +180,7 @@ mod tests {
     fn specifications_find_their_kind() {
         let folder = tempfile::tempdir().unwrap();
         let inside = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
-        std::fs::write(inside("film.mp4"), b"x").unwrap();
+        std::fs::write(inside("video.mp4"), b"x").unwrap();
         std::fs::write(inside("odd[1].png"), b"x").unwrap();
         for (spec, kind) in [
             ("-".to_string(), Some("y4m")),
@@ -191,7 +191,7 @@ mod tests {
             (inside("a.TIF"), Some("files")),
             (inside("odd[1].png"), Some("files")),
             (inside("*.png"), Some("glob")),
-            (inside("film.mp4"), Some("ffmpeg")),
+            (inside("video.mp4"), Some("ffmpeg")),
             (inside("nothing.mp4"), None),
         ] {
             assert_eq!(kind_of(&spec), kind, "{spec}");
@@ -200,7 +200,7 @@ mod tests {
 
     #[test]
     fn what_is_not_there_is_an_io_error_with_its_name() {
-        for spec in ["/no/such/folder", "/no/such/film.mp4", "/no/such/a.npy", "/no/such/a.y4m", "/no/such/a.png"] {
+        for spec in ["/no/such/folder", "/no/such/video.mp4", "/no/such/a.npy", "/no/such/a.y4m", "/no/such/a.png"] {
             let error = open(spec, &OpenOptions::default()).err().unwrap();
             assert!(matches!(error, Error::Io { .. }) && error.to_string().contains(spec), "{error}");
         }

@@ -24,7 +24,7 @@ const BATCH_BYTES: usize = 64 << 20;
 /// float32 or float64, either byte order. Where colour frames are read `(H, W, 3)` and `(H, W, 4)` are one
 /// colour frame.
 ///
-/// In C order each frame is read when it is asked for. In Fortran order the samples of one frame are spread
+/// In C order each frame is read when it is needed. In Fortran order the samples of one frame are spread
 /// over the whole file, so each pass over the file gathers as many frames as fit 64 MiB (at least one).
 #[derive(Debug)]
 pub struct NpySource<P: ChannelPolicy = Colour> {

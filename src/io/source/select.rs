@@ -3,7 +3,7 @@
 use super::{FrameSource, OpenOptions};
 use crate::error::{Error, Result};
 
-/// The frames `first`, `first + step`, ... of another source, at most `limit` of them.
+/// The frames `start`, `start + step`, ... below `stop` of another source.
 #[derive(Debug)]
 pub struct Selected<S> {
     inner: S,
@@ -14,7 +14,7 @@ pub struct Selected<S> {
 }
 
 impl<S> Selected<S> {
-    /// The part of `inner` that `options` asks for.
+    /// The part of `inner` that `options` selects.
     ///
     /// # Errors
     /// [`Error::Argument`] for a step of 0.
@@ -22,7 +22,8 @@ impl<S> Selected<S> {
         if options.step == 0 {
             return Err(Error::argument("step", "a positive integer", 0));
         }
-        Ok(Self { inner, gap: options.first, step: options.step, left: options.limit })
+        let left = options.stop.map(|stop| stop.saturating_sub(options.start).div_ceil(options.step));
+        Ok(Self { inner, gap: options.start, step: options.step, left })
     }
 }
 
@@ -65,10 +66,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn selects_as_an_iterator_does(n in 0usize..20, first in 0usize..25, step in 1usize..6, limit in proptest::option::of(0usize..10)) {
+        fn selects_as_an_iterator_does(n in 0usize..20, start in 0usize..25, step in 1usize..6, stop in proptest::option::of(0usize..40)) {
             let frames: Vec<_> = (0..n).map(|i| AnyFrame::U8(Frame::filled(1, 1, i as u8))).collect();
-            let want: Vec<_> = frames.iter().skip(first).step_by(step).take(limit.unwrap_or(usize::MAX)).cloned().collect();
-            let options = OpenOptions { first, limit, step, ..OpenOptions::default() };
+            let want: Vec<_> = frames.iter().take(stop.unwrap_or(usize::MAX)).skip(start).step_by(step).cloned().collect();
+            let options = OpenOptions { start, stop, step, ..OpenOptions::default() };
             let mut source = Selected::new(MemorySource::new(frames).unwrap().with_frame_rate(30.0), &options).unwrap();
             prop_assert_eq!(source.len_hint(), Some(want.len()));
             prop_assert_eq!(source.frame_rate(), Some(30.0 / step as f64));

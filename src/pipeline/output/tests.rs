@@ -1,4 +1,5 @@
 use super::*;
+use crate::pipeline::PictureRanges;
 
 fn decide(path: &Path, formats: &[&str], pictures: &[&str], fields: Option<usize>) -> Result<OutputPlan> {
     let words = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();

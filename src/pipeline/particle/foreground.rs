@@ -12,25 +12,25 @@ const STEM: &str = "foreground";
 const ARGUMENT: &str = "foreground";
 
 /// Writes the foreground map of every frame, 0 (background) to 255, as 8-bit grey `foreground_000012.png`,
-/// numbered as in the input, each whole, or as one film.
+/// numbered as in the input, each whole, or as one sequence.
 #[derive(Debug)]
 pub struct ForegroundMaps {
     album: Album,
 }
 
 impl ForegroundMaps {
-    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of
+    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a sequence of
     /// `frame_rate` frames per second that appears when it is finished.
     ///
     /// # Errors
     /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and
-    /// [`FilmWriter::create`](crate::io::FilmWriter::create).
+    /// [`SequenceWriter::create`](crate::io::SequenceWriter::create).
     pub fn create(path: impl AsRef<Path>, frame_rate: f64) -> Result<Self> {
         Ok(Self { album: Album::create(path.as_ref(), STEM, ARGUMENT, frame_rate)? })
     }
 
-    /// Refuses a folder that holds maps of an earlier run, which would end up as a mixture, and a film that
-    /// exists. Nothing is made.
+    /// Refuses a folder that holds maps of an earlier run, which would end up as a mixture, and a sequence
+    /// that exists. Nothing is made.
     ///
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument) named `foreground`.

@@ -1,4 +1,4 @@
-//! Targets over colour frames, as pictures or a film.
+//! Targets over colour frames, as pictures or a sequence.
 
 use super::{ParticleFrame, ParticleSink};
 use crate::error::Result;
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 const STEM: &str = "track";
 
 /// Writes every frame with its targets, each in a colour of its own, as `track_000012.png`, numbered as in
-/// the input, each whole, or as one film.
+/// the input, each whole, or as one sequence.
 #[derive(Debug)]
 pub struct ParticleOverlays {
     album: Album,
@@ -23,12 +23,12 @@ pub struct ParticleOverlays {
 }
 
 impl ParticleOverlays {
-    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of
+    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a sequence of
     /// `frame_rate` frames per second that appears when it is finished.
     ///
     /// # Errors
     /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and
-    /// [`FilmWriter::create`](crate::io::FilmWriter::create).
+    /// [`SequenceWriter::create`](crate::io::SequenceWriter::create).
     pub fn create(path: impl AsRef<Path>, overlay: TrackOverlay, frame_rate: f64) -> Result<Self> {
         let album = Album::create(path.as_ref(), STEM, "overlay", frame_rate)?;
         let overlay = TrackOverlay { colours: TrackColours::Target, ..overlay };

@@ -156,9 +156,9 @@ fn a_run_that_is_stopped_leaves_no_half_file() {
     let begun = Cell::new(0);
     let begin = || {
         begun.set(begun.get() + 1);
-        let film = folder.path().join("o.y4m");
+        let sequence = folder.path().join("o.y4m");
         let mut sinks = into(folder.path());
-        sinks[0] = Box::new(ParticleOverlays::create(film, TrackOverlay::default(), 25.0)?);
+        sinks[0] = Box::new(ParticleOverlays::create(sequence, TrackOverlay::default(), 25.0)?);
         Ok(sinks)
     };
     let mut run = ParticleRun::new(&[start(1, 0)], options(), Numbering::default());

@@ -4,8 +4,8 @@ use super::*;
 use crate::io::MemorySource;
 use crate::parallel::Silent;
 use crate::types::{AnyFrame, FieldLayout, FlowField, Frame, SamplingGrid};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 
 /// Gives a field of the frame's mean for every frame from the second on.
 struct Means(usize);
@@ -14,8 +14,9 @@ impl Stage<f32> for Means {
     fn frames_needed(&self) -> usize {
         2
     }
-    fn push(&mut self, frame: Arc<Frame<f32>>) -> Result<Option<Output<f32>>> {
+    fn push(&mut self, frame: AnyFrame) -> Result<Option<Output<f32>>> {
         self.0 += 1;
+        let frame = Arc::new(frame.to_real::<f32>());
         let layout = FieldLayout {
             frame_size: frame.size(),
             sites: SamplingGrid::default(),
@@ -75,13 +76,14 @@ fn source(sizes: &[usize]) -> Box<dyn FrameSource> {
 fn fields_are_numbered_as_the_input_and_counted() {
     let kept = Collect::default();
     let fields = kept.handle();
-    let numbering = Numbering { first: 10, step: 3, rate: Some(30.0) };
-    let mut pipeline = Pipeline::new(Box::new(Means(0))).with_numbering(numbering).with_sink(Box::new(kept));
+    let numbering = Numbering { start: 10, step: 3, rate: Some(30.0) };
+    let mut pipeline =
+        Pipeline::new(Box::new(Means(0))).with_numbering(numbering).with_sinks([Box::new(kept) as Box<dyn Sink<f32>>]);
     let frames = (1..=4).map(|v| AnyFrame::U8(Frame::filled(2, 2, v))).collect();
     pipeline.run(Box::new(MemorySource::new(frames).unwrap()), &Silent).unwrap();
     let fields = fields.lock().unwrap();
     assert_eq!(fields.iter().map(|f| f.layout.frame_index).collect::<Vec<_>>(), [13, 16, 19]);
-    assert_eq!(fields.iter().map(|f| f.motion[0]).collect::<Vec<_>>(), [2.0, 3.0, 4.0]);
+    assert_eq!(fields.iter().map(|f| f.motion[0]).collect::<Vec<_>>(), [2.0_f32, 3.0, 4.0]);
     let summary = pipeline.summary();
     assert_eq!((summary.frames, summary.fields, summary.valid_share()), (4, 3, 0.25));
     assert_eq!((numbering.period(), numbering.time(30)), (Some(0.1), Some(1.0)));
@@ -97,7 +99,7 @@ fn sinks_learn_how_a_run_ended() {
     ];
     for (sizes, stop, message, ending, accepted) in cases {
         let sink = Ended::default();
-        let mut pipeline = Pipeline::new(Box::new(Means(0))).with_sink(Box::new(sink.clone()));
+        let mut pipeline = Pipeline::new(Box::new(Means(0))).with_sinks([Box::new(sink.clone()) as Box<dyn Sink<f32>>]);
         let result = pipeline.run(source(sizes), &StopAfter(stop));
         let told = result.err().map_or(String::new(), |error| error.to_string());
         assert!(told.contains(message) && told.is_empty() == message.is_empty(), "{told}");

@@ -61,8 +61,8 @@ pub struct EgomotionPlan {
     pub field: FieldOptions,
     /// How the motion is estimated.
     pub motion: MotionOptions,
-    /// What the thing in the field options' region may turn by itself, rad/frame: its rotation is then known
-    /// beforehand as that of the rest of the scene. `None`: nothing is known of it.
+    /// How much the object in the field options' region may turn by itself, rad/frame: its rotation is then
+    /// known beforehand as that of the rest of the scene. `None`: nothing is known of it.
     pub object_rotation_std: Option<f64>,
     /// Where rows go.
     pub target: TableTarget,
@@ -111,7 +111,7 @@ impl Egomotion {
         estimate_motion(&flow, &Noise::Covariances(&points.covariances), &options)
     }
 
-    /// The motion of the scene around the region, where a thing that moves by itself lies in this.
+    /// The motion of the scene around the region, where an independently moving object lies in the region.
     fn scene<T: Real>(&self, field: &FlowField<T>) -> Result<Option<(MotionEstimate, f64)>> {
         let (Some(object_rotation_std), Some(region)) = (self.plan.object_rotation_std, self.plan.field.region) else {
             return Ok(None);

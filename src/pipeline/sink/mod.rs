@@ -15,7 +15,10 @@ pub use pictures::{PictureRanges, Pictures};
 pub(in crate::pipeline) use table::end_table;
 pub use table::{Rows, Table, TableTarget};
 
-use crate::error::Result;
+use super::output::{OutputPlan, Place, check_writable};
+use crate::error::{Error, Result};
+use crate::io::Element;
+use crate::math::Real;
 use crate::types::{FlowField, Frame};
 use std::path::PathBuf;
 
@@ -57,5 +60,30 @@ pub trait Sink<T>: Send {
     /// Files in place so far: their number and the latest one.
     fn files(&self) -> (usize, Option<PathBuf>) {
         (0, None)
+    }
+}
+
+impl OutputPlan {
+    /// The sinks of this plan, whose folder is made where there is none; `options` says (in JSON) how the
+    /// fields are made.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the folder cannot be made or written.
+    pub fn sinks<T: Real + Element>(&self, options: String, ranges: PictureRanges) -> Result<Vec<Box<dyn Sink<T>>>> {
+        if let Place::Folder(folder) = &self.place {
+            std::fs::create_dir_all(folder).map_err(|source| Error::io(folder, source))?;
+            check_writable(folder)?;
+        }
+        let mut sinks: Vec<Box<dyn Sink<T>>> = Vec::new();
+        if !self.formats.is_empty() {
+            sinks.push(Box::new(Fields::new(self.clone(), options)));
+        }
+        if !self.pictures.is_empty() {
+            sinks.push(Box::new(Pictures::new(self.clone(), ranges)));
+        }
+        if let Some(target) = &self.table {
+            sinks.push(Box::new(Rows::new(target.clone())));
+        }
+        Ok(sinks)
     }
 }

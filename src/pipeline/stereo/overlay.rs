@@ -1,4 +1,4 @@
-//! Clusters and disparities over the left views, as pictures or a film.
+//! Clusters and disparities over the left views, as pictures or a sequence.
 
 use super::{StereoSink, StereoStep};
 use crate::error::Result;
@@ -66,7 +66,7 @@ impl StereoPicture {
     }
 }
 
-/// Writes a picture of every step, numbered as the pairs in the input, each whole, or one film.
+/// Writes a picture of every step, numbered as the pairs in the input, each whole, or one sequence.
 #[derive(Debug)]
 pub struct StereoOverlays {
     album: Album,
@@ -76,20 +76,20 @@ pub struct StereoOverlays {
 }
 
 impl StereoOverlays {
-    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of
+    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a sequence of
     /// `frame_rate` frames per second that appears when it is finished. Pictures are `enlargement` times as
     /// large as the views.
     ///
     /// # Errors
     /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and
-    /// [`FilmWriter::create`](crate::io::FilmWriter::create).
+    /// [`SequenceWriter::create`](crate::io::SequenceWriter::create).
     pub fn create(path: &Path, kind: StereoPicture, enlargement: usize, frame_rate: f64) -> Result<Self> {
         let album = Album::create(path, kind.stem(), kind.argument(), frame_rate)?;
         Ok(Self { album, kind, enlargement, range: None })
     }
 
-    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a film
-    /// that exists. Nothing is made.
+    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a
+    /// sequence that exists. Nothing is made.
     ///
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument) named `overlay` or `disparity_overlay`.

@@ -24,7 +24,7 @@ impl PairTimes {
             let got = format!("{} in line {}", times[i], i + 1);
             return Err(Error::argument("times", "seconds that ascend", got));
         }
-        let used: Vec<f64> = times.iter().copied().skip(numbering.first).step_by(numbering.step.max(1)).collect();
+        let used: Vec<f64> = times.iter().copied().skip(numbering.start).step_by(numbering.step.max(1)).collect();
         let mut steps: Vec<f64> = used.windows(2).map(|pair| pair[1] - pair[0]).collect();
         match median(&mut steps) {
             Some(ordinary) => Ok(Self { times: times.iter().map(|time| time - times[0]).collect(), ordinary }),
@@ -56,7 +56,7 @@ mod tests {
 
     #[test]
     fn steps_are_counted_in_ordinary_ones() {
-        let every_other = Numbering { first: 1, step: 2, rate: None };
+        let every_other = Numbering { start: 1, step: 2, rate: None };
         let times = PairTimes::new(&[5.0, 5.1, 5.2, 5.3, 5.4, 5.5, 5.9, 6.1], every_other).unwrap();
         // Used are those at 5.1, 5.3, 5.5 and 6.1.
         assert!((times.steps(5, 7).unwrap() - 3.0).abs() < 1e-9 && (times.steps(1, 3).unwrap() - 1.0).abs() < 1e-9);

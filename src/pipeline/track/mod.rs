@@ -131,7 +131,7 @@ impl TrackRun {
     /// Works through `source` and ends every sink, however the run ends. `begin` makes trackers and sinks;
     /// the trackers' state at the first frame is the first row.
     ///
-    /// `progress` is told the number of frames read, at least once a frame and while waiting for one; its
+    /// `progress` receives the number of frames read, at least once a frame and while waiting for one; its
     /// error stops the run, and what is complete then stays.
     ///
     /// # Errors
@@ -141,7 +141,7 @@ impl TrackRun {
         let start = Instant::now();
         let worked = self.work(source, begin, progress);
         let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
-        // Every sink is ended even when an earlier one fails; the first error is the one that is told.
+        // Every sink is ended even when an earlier one fails; the first error is returned.
         let mut result = worked;
         for sink in &mut self.sinks {
             result = result.and(sink.finish(ending));

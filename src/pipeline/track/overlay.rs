@@ -1,4 +1,4 @@
-//! Tracks over the frames, as pictures or a film.
+//! Tracks over the frames, as pictures or a sequence.
 
 use super::{TrackSink, TrackStep};
 use crate::error::Result;
@@ -15,7 +15,7 @@ pub const PATH_LENGTH: usize = 1000;
 const STEM: &str = "track";
 
 /// Writes every frame with its targets as `track_000012.png`, numbered as in the input, each whole, or as one
-/// film.
+/// sequence.
 #[derive(Debug)]
 pub struct Overlays {
     album: Album,
@@ -25,19 +25,19 @@ pub struct Overlays {
 }
 
 impl Overlays {
-    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a film of
+    /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a sequence of
     /// `frame_rate` frames per second that appears when it is finished.
     ///
     /// # Errors
     /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and
-    /// [`FilmWriter::create`](crate::io::FilmWriter::create).
+    /// [`SequenceWriter::create`](crate::io::SequenceWriter::create).
     pub fn create(path: impl AsRef<Path>, overlay: TrackOverlay, frame_rate: f64) -> Result<Self> {
         let album = Album::create(path.as_ref(), STEM, "overlay", frame_rate)?;
         Ok(Self { album, overlay, range: None, paths: Vec::new() })
     }
 
-    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a film
-    /// that exists. Nothing is made.
+    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a
+    /// sequence that exists. Nothing is made.
     ///
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument) named `overlay`.

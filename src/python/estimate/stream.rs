@@ -1,30 +1,29 @@
 //! `FlowEstimator`: flow from frames that come one by one.
 
-use super::arguments::{Arguments, Plan, estimator_options};
-use super::memory::{AnyField, Memory, Ring};
+use super::arguments::{Arguments, estimator_options};
 use crate::error::Error;
-use crate::python::arrays;
+use crate::python::arrays::{self, ColourRule};
 use crate::python::field::FlowField;
+use crate::python::image::renamed;
 use crate::python::keywords::{constructor, with_common};
-use crate::python::options::{self, Integer, Object, Region};
+use crate::python::options::{self, Integer, Object};
 use crate::simd::SimdReal;
-use crate::temporal::RecursiveFusion;
-use crate::types::{AnyFrame, Frame};
+use crate::temporal::{AnyFlowStream, FlowStream, Stream, StreamPlan};
+use crate::types::AnyFrame;
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
-use std::collections::VecDeque;
 
 /// Flow from a stream: frames are pushed one by one, memory stays bounded.
 ///
 /// The options are those of `estimate`; see there for what they mean and their units. A field (H, W) comes as
-/// soon as three frames have (two with time_scheme="pair"). With temporal="recursive" each field holds what
-/// all frames so far tell. Pickles in mid-stream.
+/// soon as three frames have (two with the time scheme "pair"). With temporal="recursive" each field is
+/// estimated from all frames so far. Pickles in mid-stream.
 #[pyclass(module = "jacoflow")]
 pub struct FlowEstimator {
     arguments: Arguments,
-    plan: Plan,
-    memory: Memory,
+    colour: ColourRule,
+    stream: AnyFlowStream,
 }
 
 estimator_options!(constructor [FlowEstimator from Arguments]);
@@ -37,29 +36,26 @@ impl FlowEstimator {
     /// A frame that raises an error (ValueError for another size, TypeError for another dtype) is not kept.
     fn push(&mut self, frame: &Bound<'_, PyAny>) -> PyResult<Option<FlowField>> {
         let py = frame.py();
-        let frame = arrays::frame("frame", frame, self.plan.colour)?;
-        Ok(self.memory.push(py, "frame", &self.plan, frame)?.map(AnyField::single))
+        let frame = arrays::frame("frame", frame, self.colour)?;
+        let field = py.detach(|| self.stream.push(frame)).map_err(|error| renamed(error, "frames", "frame"))?;
+        Ok(field.map(FlowField::any))
     }
 
     /// Forgets every frame (H, W); the next one begins a new sequence, frame index 0.
     fn reset(&mut self) {
-        self.memory = Memory::Empty;
+        self.stream.reset();
     }
 
     /// Frames that must come before the first field (a count, no unit).
     #[getter]
     fn frames_needed(&self) -> usize {
-        self.plan.estimator.frames_needed()
+        self.stream.plan().estimator().frames_needed()
     }
 
     /// How many frames have been pushed since the start or the last reset (a count, no unit).
     #[getter]
     fn frames_pushed(&self) -> usize {
-        match &self.memory {
-            Memory::Empty => 0,
-            Memory::Single(ring) => ring.pushed,
-            Memory::Double(ring) => ring.pushed,
-        }
+        self.stream.pushed()
     }
 
     /// The options as a dictionary, in the units of `estimate`.
@@ -69,7 +65,8 @@ impl FlowEstimator {
     }
 
     fn __repr__(&self) -> String {
-        format!("FlowEstimator(method={:?}, frames_pushed={})", self.arguments.method, self.frames_pushed())
+        let method = self.stream.plan().estimator().method().name();
+        format!("FlowEstimator(method={method:?}, frames_pushed={})", self.frames_pushed())
     }
 
     fn __reduce__<'py>(
@@ -77,11 +74,13 @@ impl FlowEstimator {
         py: Python<'py>,
     ) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyDict>, Bound<'py, PyDict>))> {
         let memory = PyDict::new(py);
-        match &self.memory {
-            Memory::Empty => {}
-            Memory::Single(ring) => save(&memory, ring)?,
-            Memory::Double(ring) => save(&memory, ring)?,
+        let (dtype, stream) = self.stream.stream();
+        match stream {
+            Stream::Empty => {}
+            Stream::Single(stream) => save(&memory, stream)?,
+            Stream::Double(stream) => save(&memory, stream)?,
         }
+        memory.set_item("dtype", dtype)?;
         let restore = py.import("jacoflow._jacoflow")?.getattr("_restore_estimator")?;
         Ok((restore, (self.options(py)?, memory)))
     }
@@ -90,19 +89,18 @@ impl FlowEstimator {
 impl FlowEstimator {
     fn from_arguments(py: Python<'_>, arguments: Arguments) -> PyResult<Self> {
         let arguments = arguments.keep(py)?;
-        Ok(Self { plan: arguments.plan(py)?, arguments, memory: Memory::Empty })
+        Ok(Self { stream: arguments.stream(py, false)?, colour: arguments.colour(py)?, arguments })
     }
 }
 
-fn save<T: numpy::Element + SimdReal>(memory: &Bound<'_, PyDict>, ring: &Ring<T>) -> PyResult<()> {
+fn save<T: numpy::Element + SimdReal>(memory: &Bound<'_, PyDict>, stream: &FlowStream<T>) -> PyResult<()> {
     let py = memory.py();
-    let frames = ring.frames.iter().map(|frame| arrays::from_frame(py, frame.clone()));
+    let frames = stream.frames().map(|frame| arrays::from_frame(py, frame.clone()));
     memory.set_item("frames", PyList::new(py, frames.collect::<PyResult<Vec<_>>>()?)?)?;
-    if let Some((sites, state)) = ring.fusion.as_ref().map(RecursiveFusion::state) {
+    if let Some((sites, state)) = stream.fused() {
         memory.set_item("fused", (sites, arrays::owned(py, &[state.len()], state.to_vec())?))?;
     }
-    memory.set_item("pushed", ring.pushed)?;
-    memory.set_item("dtype", ring.dtype)
+    memory.set_item("pushed", stream.pushed())
 }
 
 /// The inverse of `FlowEstimator.__reduce__`.
@@ -113,34 +111,31 @@ pub fn restore_estimator(py: Python<'_>, options: Arguments, memory: &Bound<'_, 
     let missing = || Error::argument("memory", "the entries frames, pushed and dtype", "fewer");
     let pushed: usize = memory.get_item("pushed")?.ok_or_else(missing)?.extract()?;
     let dtype: String = memory.get_item("dtype")?.ok_or_else(missing)?.extract()?;
-    let dtype = options::known_dtype(&dtype)?;
-    let mut single: VecDeque<Frame<f32>> = VecDeque::new();
-    let mut double: VecDeque<Frame<f64>> = VecDeque::new();
-    for frame in frames.try_iter()? {
-        match arrays::frame("memory", &frame?, arrays::ColourRule::Refuse)? {
-            AnyFrame::F64(frame) => double.push_back(frame),
-            other => single.push_back(other.to_real()),
-        }
-    }
-    let fused = memory.get_item("fused")?;
-    estimator.memory = if double.is_empty() {
-        let fusion = restore_fusion(&estimator.plan, fused)?;
-        Memory::Single(Ring { frames: single, pushed, dtype, fusion })
+    let frames: Vec<AnyFrame> = frames
+        .try_iter()?
+        .map(|frame| arrays::frame("memory", &frame?, ColourRule::Refuse))
+        .collect::<PyResult<_>>()?;
+    let (plan, fused) = (estimator.stream.plan().clone(), memory.get_item("fused")?);
+    let stream = if frames.iter().any(|frame| matches!(frame, AnyFrame::F64(_))) {
+        Stream::Double(restored(plan, &frames, pushed, fused)?)
     } else {
-        let fusion = restore_fusion(&estimator.plan, fused)?;
-        Memory::Double(Ring { frames: double, pushed, dtype, fusion })
+        Stream::Single(restored(plan, &frames, pushed, fused)?)
     };
+    estimator.stream.resume(options::known_dtype(&dtype)?, stream);
     Ok(estimator)
 }
 
-/// What the estimates before told, where they are fused.
-fn restore_fusion<T: numpy::Element + SimdReal>(
-    plan: &Plan,
-    saved: Option<Bound<'_, PyAny>>,
-) -> PyResult<Option<RecursiveFusion<T>>> {
-    let (Some(options), Some(saved)) = (plan.recursive, saved) else { return Ok(None) };
-    let (sites, state): (usize, PyReadonlyArray1<'_, T>) = saved.extract()?;
-    let mut fusion = RecursiveFusion::new(&plan.estimator, options)?;
-    fusion.restore(sites, state.as_slice()?.to_vec())?;
-    Ok(Some(fusion))
+fn restored<T: numpy::Element + SimdReal>(
+    plan: StreamPlan,
+    frames: &[AnyFrame],
+    pushed: usize,
+    fused: Option<Bound<'_, PyAny>>,
+) -> PyResult<FlowStream<T>> {
+    let fused = fused.map(|saved| -> PyResult<_> {
+        let (sites, state): (usize, PyReadonlyArray1<'_, T>) = saved.extract()?;
+        Ok((sites, state.as_slice()?.to_vec()))
+    });
+    let mut stream = FlowStream::new(plan)?;
+    stream.restore(frames.iter().map(AnyFrame::to_real), pushed, fused.transpose()?)?;
+    Ok(stream)
 }

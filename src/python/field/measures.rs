@@ -97,7 +97,7 @@ impl FlowField {
     }
 
     /// The parameter or derived quantity `name`, float64 array (..., H, W), in the unit that `unit(name)`
-    /// tells.
+    /// gives.
     ///
     /// Names are those of `parameters` and of `quantities()`. ValueError for another name, and for rpm
     /// without a frame period.

@@ -11,7 +11,7 @@ mod state;
 use super::arrays;
 use crate::error::Error;
 use crate::math::Real;
-use crate::types::{FieldLayout, FlowField as CoreField, MOTION_NAMES, SamplingGrid};
+use crate::types::{AnyField, FieldLayout, FlowField as CoreField, MOTION_NAMES, SamplingGrid};
 use numpy::Element;
 use pyo3::prelude::*;
 use std::sync::Arc;
@@ -85,6 +85,14 @@ impl FlowField {
     /// The result for a single triple or pair of frames.
     pub fn single<T: Stored>(field: CoreField<T>) -> Self {
         Self { store: T::store(Packed::one(field)), start: 0, count: 1, stack: false }
+    }
+
+    /// The result for a single triple or pair of frames, in its precision.
+    pub fn any(field: AnyField) -> Self {
+        match field {
+            AnyField::Single(field) => Self::single(field),
+            AnyField::Double(field) => Self::single(field),
+        }
     }
 
     /// The result for a stack.

@@ -1,8 +1,8 @@
 //! Fields of consecutive frames in one piece of memory, so that every array seen from Python is a view.
 
+use crate::buffer_pool;
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::python::spare;
 use crate::types::{FieldLayout, FlowField as CoreField, Status};
 
 /// `count` fields of one layout: for each plane-wise quantity the planes of frame 0, then those of frame 1,
@@ -68,14 +68,14 @@ impl<T: Real> Packed<T> {
         Ok(())
     }
 
-    /// SamplingGrid of one field.
-    pub fn sites(&self) -> usize {
+    /// Number of sites of one field.
+    pub fn site_count(&self) -> usize {
         self.width * self.height
     }
 
     /// Values of `motion` that belong to one field.
     fn stride(&self) -> usize {
-        self.sites() * self.layout.parameters.len()
+        self.site_count() * self.layout.parameters.len()
     }
 
     /// A copy of field `index`, as the core takes it.
@@ -84,7 +84,7 @@ impl<T: Real> Packed<T> {
             let length = values.len() / self.count.max(1);
             values[index * length..(index + 1) * length].to_vec()
         };
-        let sites = index * self.sites()..(index + 1) * self.sites();
+        let sites = index * self.site_count()..(index + 1) * self.site_count();
         let mut layout = self.layout.clone();
         layout.frame_index += index;
         CoreField {
@@ -108,17 +108,17 @@ impl<T: Real> Packed<T> {
 
 impl<T: Real> Drop for Packed<T> {
     fn drop(&mut self) {
-        spare::give(std::mem::take(&mut self.motion));
-        spare::give(std::mem::take(&mut self.status));
+        buffer_pool::give(std::mem::take(&mut self.motion));
+        buffer_pool::give(std::mem::take(&mut self.status));
         if let Some(planes) = self.covariance.take() {
-            spare::give(planes);
+            buffer_pool::give(planes);
         }
     }
 }
 
 fn extend_from<T: Copy + Send + 'static>(planes: &mut Vec<T>, more: Vec<T>) {
     planes.extend_from_slice(&more);
-    spare::give(more);
+    buffer_pool::give(more);
 }
 
 fn extend<T: Copy + Send + 'static>(planes: &mut Option<Vec<T>>, more: Option<Vec<T>>) {

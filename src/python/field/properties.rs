@@ -64,7 +64,7 @@ impl FlowField {
     }
 
     /// Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), px/frame and 1/frame squared; None
-    /// if it was not asked for.
+    /// if it was not requested.
     ///
     /// Rows and columns of parameters that the model lacks are zero. A new array at every access.
     #[getter]
@@ -178,7 +178,7 @@ impl FlowField {
         &self.layout().model
     }
 
-    /// Names of the model's parameters; `unit(name)` tells their units.
+    /// Names of the model's parameters; `unit(name)` gives their units.
     #[getter]
     fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
         PyTuple::new(py, &self.layout().parameters)
@@ -217,7 +217,7 @@ impl FlowField {
         }
     }
 
-    /// True, whatever it holds: a field is there. (An estimator that has none yet returns None.)
+    /// True for any content: a field is there. (An estimator that has none yet returns None.)
     #[allow(clippy::unused_self, reason = "Python's signature")]
     fn __bool__(&self) -> bool {
         true
@@ -247,7 +247,7 @@ impl FlowField {
         let (width, height) = self.size();
         let layout = self.layout();
         let known = each!(self.store, packed => {
-            let sites = packed.sites();
+            let sites = packed.site_count();
             packed.status[self.start * sites..(self.start + self.count) * sites]
                 .iter()
                 .filter(|&&code| Status::from_code(code).is_some_and(Status::is_valid))

@@ -235,7 +235,7 @@ impl GaussianFilter {
     fn log_likelihood(&self, py: Python<'_>) -> Py<PyAny> {
         self.get(py, 7)
     }
-    /// How often a covariance had lost its positive definiteness and was mended (a count, no unit).
+    /// How often a covariance had lost its positive definiteness and was repaired (a count, no unit).
     #[getter]
     fn repairs(&self) -> u64 {
         self.variables().repairs

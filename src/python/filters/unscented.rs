@@ -14,10 +14,10 @@ use std::sync::Mutex;
 ///
 /// `fx(points, dt)` and `hx(points)` are vectorised: they receive every sigma point in one array (2 n + 1,
 /// n), or (B, 2 n + 1, n) with `batch=B`, and return (..., n) and (..., m). `dt` is handed to `fx` as it is,
-/// in whatever unit `fx` wants. `points` is a MerweScaledSigmaPoints. With `augmented=True` the noise is part
-/// of the sigma points, `fx(points, noise, dt)` with 4 n + 1 rows each. With `redraw=True` new points are
-/// drawn for the measurement; False measures the propagated ones, as filterpy 1 did, which leaves Q out of
-/// the innovation covariance.
+/// in the unit that `fx` expects. `points` is a MerweScaledSigmaPoints. With `augmented=True` the noise is
+/// part of the sigma points, `fx(points, noise, dt)` with 4 n + 1 rows each. With `redraw=True` new points
+/// are drawn for the measurement; False measures the propagated ones, as filterpy 1 did, which leaves Q out
+/// of the innovation covariance.
 #[pyclass(module = "jacoflow.filters", extends = GaussianFilter, frozen)]
 pub struct UnscentedKalmanFilter {
     core: Mutex<Core>,
@@ -84,7 +84,7 @@ impl UnscentedKalmanFilter {
     fn points_fn(&self) -> MerweScaledSigmaPoints {
         self.points.clone()
     }
-    /// Step handed to `fx`, in whatever unit it wants.
+    /// Step handed to `fx`, in the unit that it expects.
     #[getter]
     fn dt(&self) -> f64 {
         self.dt

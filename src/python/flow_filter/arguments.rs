@@ -1,10 +1,10 @@
-//! What `FlowFilter` is told, and the core options that it means.
+//! The options of `FlowFilter`, and the core's options that they mean.
 
 use crate::error::Error;
 use crate::filter::SigmaPoints;
 use crate::python::arrays;
 use crate::python::keywords::{keep_options, with_common};
-use crate::python::options::{self, Integer, Object, Region};
+use crate::python::options::{self, Group, Integer, Object};
 use crate::temporal::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
 use pyo3::prelude::*;
 
@@ -13,20 +13,7 @@ macro_rules! filter_options {
     ($then:ident $target:tt) => {
         with_common! {
             $then $target
-            profile: String as &str = "patent",
-            form: Option<String> as Option<String> = None,
-            transition: Option<String> as Option<String> = None,
-            square_root: Option<String> as Option<String> = None,
-            neighbourhood: Object as Object = None,
-            neighbourhood_sigma: Option<f64> as Option<f64> = None,
-            Q: Object as Object = None,
-            R: Option<f64> as Option<f64> = None,
-            x0: Object as Object = None,
-            P0: Object as Object = None,
-            alpha: Option<f64> as Option<f64> = None,
-            beta: Option<f64> as Option<f64> = None,
-            kappa: Option<f64> as Option<f64> = None,
-            full_scale: Option<f64> as Option<f64> = None,
+            profile: Object as Object = None,
             covariance: bool as bool = true,
         }
     };
@@ -36,9 +23,9 @@ pub(super) use filter_options;
 filter_options!(keep_options[Arguments]);
 
 /// Twelve numbers, one for each component of the state.
-fn twelve(py: Python<'_>, name: &'static str, value: &Object, default: [f64; 12]) -> PyResult<[f64; 12]> {
-    let Some(value) = value else { return Ok(default) };
-    let (shape, values) = arrays::doubles(name, value.bind(py))?;
+fn twelve(group: &Group<'_>, name: &'static str, default: [f64; 12]) -> PyResult<[f64; 12]> {
+    let Some(value) = group.get::<Bound<'_, PyAny>>(name)? else { return Ok(default) };
+    let (shape, values) = arrays::doubles(name, &value)?;
     values
         .try_into()
         .map_err(|_| Error::argument(name, "twelve numbers, shape (12,)", format!("shape {shape:?}")).into())
@@ -47,50 +34,50 @@ fn twelve(py: Python<'_>, name: &'static str, value: &Object, default: [f64; 12]
 impl Arguments {
     /// With copies of the arrays, safe from later changes.
     pub fn keep(mut self, py: Python<'_>) -> PyResult<Self> {
-        let kept = [&mut self.neighbourhood, &mut self.Q, &mut self.x0, &mut self.P0, &mut self.points, &mut self.mask];
-        for object in kept {
+        for object in [&mut self.profile, &mut self.grid, &mut self.mask, &mut self.preprocess] {
             *object = options::keep(py, object.take())?;
         }
         Ok(self)
     }
 
+    /// The name of the profile, and the options that replace its own.
+    pub fn profile<'py>(&self, py: Python<'py>) -> PyResult<(String, Group<'py>)> {
+        if let Some(name) = options::word(py, &self.profile) {
+            return Ok((name, Group::new(py, "profile", &[], &None)?));
+        }
+        let group = Group::new(py, "profile", &["FilterProfile"], &self.profile)?;
+        Ok((group.get("name")?.unwrap_or_else(|| "patent".into()), group))
+    }
+
     /// The core's options; `full_scale` stays that of the profile unless it was given.
     pub fn options(&self, py: Python<'_>) -> PyResult<FlowFilterOptions> {
-        let base = match self.profile.as_str() {
-            "patent" => FlowFilterOptions::patent(),
-            "measured" => FlowFilterOptions::measured(),
-            other => {
-                let expected = "\"patent\" or \"measured\"";
-                return Err(Error::argument("profile", expected, format!("{other:?}")).into());
-            }
-        };
+        let (name, group) = self.profile(py)?;
+        let base = FlowFilterOptions::profile(&name)?;
+        let word = |name| group.get::<String>(name);
         let points = base.sigma_points;
+        let pixels = group.get::<Bound<'_, PyAny>>("neighbourhood")?;
+        let pixels = pixels.as_ref().map(options::neighbourhood).transpose()?.unwrap_or(base.neighbourhood);
         Ok(FlowFilterOptions {
-            neighbourhood: options::neighbourhood(
-                py,
-                &self.neighbourhood,
-                self.neighbourhood_sigma,
-                &base.neighbourhood,
-            )?,
-            form: self.form.as_deref().map_or(Ok(base.form), FilterForm::parse)?,
-            transition: self.transition.as_deref().map_or(Ok(base.transition), Transition::parse)?,
-            square_root: self.square_root.as_deref().map(SquareRoot::parse).transpose()?,
-            process_noise: twelve(py, "Q", &self.Q, base.process_noise)?,
-            measurement_noise: self.R.unwrap_or(base.measurement_noise),
-            initial_mean: twelve(py, "x0", &self.x0, base.initial_mean)?,
-            initial_covariance: twelve(py, "P0", &self.P0, base.initial_covariance)?,
+            neighbourhood: pixels.weighted(group.get("neighbourhood_sigma")?),
+            form: word("form")?.map_or(Ok(base.form), |name| FilterForm::parse(&name))?,
+            transition: word("transition")?.map_or(Ok(base.transition), |name| Transition::parse(&name))?,
+            square_root: word("square_root")?.map(|name| SquareRoot::parse(&name)).transpose()?,
+            process_noise: twelve(&group, "Q", base.process_noise)?,
+            measurement_noise: group.get("R")?.unwrap_or(base.measurement_noise),
+            initial_mean: twelve(&group, "x0", base.initial_mean)?,
+            initial_covariance: twelve(&group, "P0", base.initial_covariance)?,
             sigma_points: SigmaPoints::new(
-                self.alpha.unwrap_or(points.alpha),
-                self.beta.unwrap_or(points.beta),
-                self.kappa.unwrap_or(points.kappa),
+                group.get("alpha")?.unwrap_or(points.alpha),
+                group.get("beta")?.unwrap_or(points.beta),
+                group.get("kappa")?.unwrap_or(points.kappa),
             )?,
-            full_scale: self.full_scale.unwrap_or(base.full_scale),
-            sites: options::sites(py, &self.points, self.region, self.stride)?,
+            full_scale: group.get("full_scale")?.unwrap_or(base.full_scale),
+            sites: options::grid(py, &self.grid)?,
             mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
             covariance: self.covariance,
             residual: base.residual,
             pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(base.pixel_pitch),
-            frame_period: options::frame_period(self.fps, self.frame_period)?,
+            frame_period: options::frame_period(self.fps)?,
             threads: options::threads(self.threads)?,
             simd: options::simd(self.simd.as_deref())?,
         })

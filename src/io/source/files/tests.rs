@@ -28,7 +28,7 @@ fn a_folder_is_read_in_natural_order_and_other_files_are_left_out() {
     assert_eq!(first_samples(folder.path(), &options), [1.0, 9.0, 10.0, 100.0]);
     assert_eq!(first_samples(&folder.path().join("frame1*.png"), &options), [1.0, 10.0, 100.0]);
     assert_eq!(first_samples(&folder.path().join("frame9.png"), &options), [9.0]);
-    let part = OpenOptions { first: 1, step: 2, ..options };
+    let part = OpenOptions { start: 1, step: 2, ..options };
     assert_eq!(first_samples(folder.path(), &part), [9.0, 100.0]);
     fs::write(folder.path().join("list.txt"), "frame100.png\nframe9.png\n").unwrap();
     assert_eq!(first_samples(&folder.path().join("list.txt"), &options), [100.0, 9.0]);
@@ -131,7 +131,7 @@ fn sources_of_files_give_colour() {
     assert_eq!(reds("", &options), [1.0, 2.0, 10.0]);
     assert_eq!(reds("f1*.png", &options), [1.0, 10.0]);
     assert_eq!(reds("list.txt", &options), [10.0, 1.0]);
-    assert_eq!(reds("", &OpenOptions { first: 1, step: 2, ..options }), [2.0]);
+    assert_eq!(reds("", &OpenOptions { start: 1, step: 2, ..options }), [2.0]);
     grey(0).save(folder.path().join("f3.png")).unwrap();
     let error = open_colour(&folder.path().join("f3.png").to_string_lossy(), &options).unwrap().next_frame();
     assert!(error.unwrap_err().to_string().contains("colour is needed"));
@@ -168,7 +168,7 @@ fn tiff_pages_are_frames_of_a_file_opened_by_itself() {
     let path = folder.path().join("stack.tif");
     write_pages(&path, &[1.5, 2.5, 3.5]);
     assert_eq!(first_samples(&path, &OpenOptions::default()), [1.5, 2.5, 3.5]);
-    let mut source = open(&path.to_string_lossy(), &OpenOptions { first: 1, ..OpenOptions::default() }).unwrap();
+    let mut source = open(&path.to_string_lossy(), &OpenOptions { start: 1, ..OpenOptions::default() }).unwrap();
     assert_eq!(source.len_hint(), Some(2));
     assert!(matches!(source.next_frame().unwrap(), Some(AnyFrame::F32(_))));
     assert_eq!(source.len_hint(), Some(1));

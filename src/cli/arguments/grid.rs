@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// Region, grid, points and mask.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Where")]
-pub struct SiteArguments {
+pub struct GridArguments {
     /// Only this rectangle of pixels
     #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = parse_rect)]
     pub region: Option<Rect>,
@@ -23,12 +23,12 @@ pub struct SiteArguments {
     pub mask: Option<PathBuf>,
 }
 
-impl SiteArguments {
+impl GridArguments {
     /// The sites these arguments ask for.
     ///
     /// # Errors
     /// A points file that cannot be read or holds anything but pixels.
-    pub fn sites(&self) -> Result<SamplingGrid> {
+    pub fn sampling_grid(&self) -> Result<SamplingGrid> {
         if self.points.is_empty() {
             return Ok(SamplingGrid::Grid { region: self.region, stride: self.stride.unwrap_or(1) });
         }
@@ -114,16 +114,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("points.csv");
         std::fs::write(&file, "name,y,x\na,2,1\n\nb,4,3\n").unwrap();
-        let arguments = SiteArguments {
+        let arguments = GridArguments {
             region: None,
             stride: None,
             points: vec!["7,8".into(), file.to_string_lossy().into()],
             mask: None,
         };
-        assert_eq!(arguments.sites().unwrap(), SamplingGrid::Points(vec![(7, 8), (1, 2), (3, 4)]));
+        assert_eq!(arguments.sampling_grid().unwrap(), SamplingGrid::Points(vec![(7, 8), (1, 2), (3, 4)]));
         std::fs::write(&file, "1,2\n3,-4\n").unwrap();
-        assert!(arguments.sites().unwrap_err().to_string().contains("line 2"));
-        let negative = SiteArguments { points: vec!["-1,2".into()], ..arguments };
-        assert!(negative.sites().unwrap_err().to_string().contains("points"));
+        assert!(arguments.sampling_grid().unwrap_err().to_string().contains("line 2"));
+        let negative = GridArguments { points: vec!["-1,2".into()], ..arguments };
+        assert!(negative.sampling_grid().unwrap_err().to_string().contains("points"));
     }
 }

@@ -1,4 +1,4 @@
-//! Pictures as a film: colour YUV4MPEG2, which players and encoders read.
+//! Pictures as a sequence: colour YUV4MPEG2, which players and encoders read.
 
 use super::sink::{eight_bit_planes, ratio};
 use super::write::AtomicFile;
@@ -9,14 +9,14 @@ use std::path::{Path, PathBuf};
 
 /// Writes pictures of one size as `C444`, full range, by the matrix of ITU-R BT.601 as JPEG has it.
 #[derive(Debug)]
-pub struct FilmWriter {
+pub struct SequenceWriter {
     file: AtomicFile,
     path: PathBuf,
     rate: (u64, u64),
     size: Option<(usize, usize)>,
 }
 
-impl FilmWriter {
+impl SequenceWriter {
     /// Begins a file, which appears under its name when it is finished. `frame_rate`: frames per second.
     ///
     /// # Errors
@@ -60,7 +60,7 @@ impl FilmWriter {
         self.file.commit()
     }
 
-    /// As [`FilmWriter::finish`], under another name in the same folder.
+    /// As [`SequenceWriter::finish`], under another name in the same folder.
     ///
     /// # Errors
     /// As [`AtomicFile::commit`].
@@ -78,19 +78,19 @@ mod tests {
     fn a_film_is_read_back_and_has_one_size() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.y4m");
-        let mut film = FilmWriter::create(&path, 29.97).unwrap();
+        let mut sequence = SequenceWriter::create(&path, 29.97).unwrap();
         let picture = |level: u8| Picture::filled(6, 4, [level; 3]);
-        film.write(&picture(10)).unwrap();
-        film.write(&picture(200)).unwrap();
-        assert!(film.write(&Picture::filled(4, 6, [0; 3])).unwrap_err().to_string().starts_with("picture"));
+        sequence.write(&picture(10)).unwrap();
+        sequence.write(&picture(200)).unwrap();
+        assert!(sequence.write(&Picture::filled(4, 6, [0; 3])).unwrap_err().to_string().starts_with("picture"));
         assert!(!path.exists());
-        film.finish().unwrap();
+        sequence.finish().unwrap();
         let mut source = open(path.to_str().unwrap(), &OpenOptions::default()).unwrap();
         let mut levels = Vec::new();
         while let Some(frame) = source.next_frame().unwrap() {
             levels.push(frame.to_real::<f64>().get(5, 3));
         }
         assert_eq!(levels, [10.0, 200.0]);
-        assert!(FilmWriter::create(folder.path().join("b.y4m"), 0.0).is_err());
+        assert!(SequenceWriter::create(folder.path().join("b.y4m"), 0.0).is_err());
     }
 }

@@ -1,0 +1,231 @@
+//! A flow filter whose precision and sample type are those of its first frame.
+
+use super::{FlowFilter, FlowFilterOptions, SavedFilter};
+use crate::error::{Error, Result};
+use crate::image::Preprocess;
+use crate::io::Element;
+use crate::io::npz::NpzReader;
+use crate::simd::SimdReal;
+use crate::types::{AnyField, AnyFrame, FlowField, Precision, Sample};
+use std::io::{Cursor, Read, Seek};
+use std::path::Path;
+
+/// Filters frames of any sample type, prepared first.
+#[derive(Debug)]
+pub struct AnyFlowFilter {
+    options: FlowFilterOptions,
+    /// Whether `options.full_scale` holds for frames of every sample type.
+    full_scale_given: bool,
+    preprocess: Preprocess,
+    precision: Precision,
+    /// Sample type of the first frame; unknown after a state has been loaded from a file.
+    dtype: Option<&'static str>,
+    filter: Filter,
+}
+
+/// The filter in the precision that the first frame has decided.
+#[derive(Debug)]
+enum Filter {
+    /// Before the first frame.
+    Empty,
+    Single(FlowFilter<f32>),
+    Double(FlowFilter<f64>),
+}
+
+/// Runs `$body` with `$filter` bound to the filter of either precision, `$empty` before the first frame.
+macro_rules! each {
+    ($any:expr, $filter:ident => $body:expr, $empty:expr) => {
+        match $any {
+            Filter::Empty => $empty,
+            Filter::Single($filter) => $body,
+            Filter::Double($filter) => $body,
+        }
+    };
+}
+
+impl AnyFlowFilter {
+    /// A filter that starts with the first frame. Without `full_scale` that of the options holds for floating
+    /// point frames, and integer frames have the largest value of their type.
+    pub fn new(
+        options: FlowFilterOptions,
+        full_scale: Option<f64>,
+        preprocess: Preprocess,
+        precision: Precision,
+    ) -> Self {
+        let full_scale_given = full_scale.is_some();
+        let options = FlowFilterOptions { full_scale: full_scale.unwrap_or(options.full_scale), ..options };
+        Self { options, full_scale_given, preprocess, precision, dtype: None, filter: Filter::Empty }
+    }
+
+    /// The field after the next frame.
+    ///
+    /// # Errors
+    /// Those of [`FlowFilter::new`] and [`FlowFilter::push`]; [`Error::Type`] naming `frame` for another
+    /// sample type than that of the first frame; [`Error::Argument`] naming `frame` for frames of another
+    /// scale than those of a loaded state. The filter is then unchanged.
+    pub fn push(&mut self, frame: &AnyFrame) -> Result<AnyField> {
+        let (dtype, full_scale) = (frame.dtype(), self.full_scale(frame));
+        if matches!(self.filter, Filter::Empty) {
+            let options = FlowFilterOptions { full_scale, ..self.options.clone() };
+            self.filter = if self.precision.is_double(dtype) {
+                Filter::Double(FlowFilter::new(frame.size(), options)?)
+            } else {
+                Filter::Single(FlowFilter::new(frame.size(), options)?)
+            };
+        }
+        match self.dtype {
+            Some(first) if first != dtype => {
+                let expected = format!("{first} like the first frame");
+                return Err(Error::Type { argument: "frame", expected, got: dtype.into() });
+            }
+            Some(_) => {}
+            None => {
+                let scale = each!(&self.filter, filter => filter.options().full_scale, full_scale);
+                if scale != full_scale {
+                    let wanted = format!("frames of full scale {scale}, as those of the saved filter");
+                    return Err(Error::argument("frame", wanted, format!("{dtype} ({full_scale})")));
+                }
+                self.dtype = Some(dtype);
+            }
+        }
+        match &mut self.filter {
+            Filter::Empty => Err(Error::Numerical("the filter has not started".into())),
+            Filter::Single(filter) => advance(filter, &self.preprocess, frame).map(AnyField::Single),
+            Filter::Double(filter) => advance(filter, &self.preprocess, frame).map(AnyField::Double),
+        }
+    }
+
+    /// Forgets every frame.
+    pub fn reset(&mut self) {
+        (self.dtype, self.filter) = (None, Filter::Empty);
+    }
+
+    /// The options.
+    pub fn options(&self) -> &FlowFilterOptions {
+        &self.options
+    }
+
+    /// Number of frames filtered.
+    pub fn frames(&self) -> usize {
+        each!(&self.filter, filter => filter.frames(), 0)
+    }
+
+    /// How often a covariance that had lost its positive definiteness was repaired.
+    pub fn repairs(&self) -> u64 {
+        each!(&self.filter, filter => filter.repairs(), 0)
+    }
+
+    /// Width and height of the field, and the means (12 numbers) of its sites; NaN where there is no filter.
+    /// `None` before the first frame.
+    ///
+    /// # Errors
+    /// Those of [`SamplingGrid::shape`](crate::types::SamplingGrid::shape).
+    pub fn means(&self) -> Result<Option<((usize, usize), Vec<f64>)>> {
+        each!(&self.filter, filter => {
+            let values = (0..filter.len()).flat_map(|site| filter.state(site).map_or([f64::NAN; 12], |(mean, _)| mean));
+            Ok(Some((filter.options().sites.shape(filter.frame_size())?, values.collect())))
+        }, Ok(None))
+    }
+
+    /// As [`means`](Self::means): the covariances (12 x 12 numbers) of the sites.
+    ///
+    /// # Errors
+    /// As [`means`](Self::means).
+    pub fn covariances(&self) -> Result<Option<((usize, usize), Vec<f64>)>> {
+        each!(&self.filter, filter => {
+            let none = [[f64::NAN; 12]; 12];
+            let sites = (0..filter.len()).flat_map(|site| filter.state(site).map_or(none, |(_, covariance)| covariance));
+            Ok(Some((filter.options().sites.shape(filter.frame_size())?, sites.flatten().collect())))
+        }, Ok(None))
+    }
+
+    /// Writes the state into an `.npz` file.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `path` before the first frame; [`Error::Io`].
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let early = || Error::argument("path", "a filter that has seen a frame", "one that has not");
+        each!(&self.filter, filter => filter.save(path), Err(early()))
+    }
+
+    /// Replaces the state by that of a file; the next frame decides the sample type.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Format`] for a damaged file; [`Error::Argument`] naming `path` for a state
+    /// that was saved with other options.
+    pub fn load(&mut self, path: &Path) -> Result<()> {
+        let filter = if is_double(NpzReader::open(path)?)? {
+            Filter::Double(FlowFilter::load(path)?)
+        } else {
+            Filter::Single(FlowFilter::load(path)?)
+        };
+        self.resume(filter, None)
+    }
+
+    /// The state as bytes, with the sample type of its frames (empty: unknown); `None` before the first
+    /// frame.
+    ///
+    /// # Errors
+    /// Those of [`FlowFilter::to_bytes`].
+    pub fn to_bytes(&self) -> Result<Option<(Vec<u8>, &'static str)>> {
+        each!(&self.filter, filter => Ok(Some((filter.to_bytes()?, self.dtype.unwrap_or_default()))), Ok(None))
+    }
+
+    /// Replaces the state by that of [`to_bytes`](Self::to_bytes).
+    ///
+    /// # Errors
+    /// As [`load`](Self::load).
+    pub fn restore(&mut self, bytes: &[u8], dtype: Option<&'static str>) -> Result<()> {
+        let filter = if is_double(NpzReader::new(Cursor::new(bytes), "filter state")?)? {
+            Filter::Double(FlowFilter::from_bytes(bytes)?)
+        } else {
+            Filter::Single(FlowFilter::from_bytes(bytes)?)
+        };
+        self.resume(filter, dtype)
+    }
+
+    /// The sample value of 255 grey levels for frames like this one.
+    fn full_scale(&self, frame: &AnyFrame) -> f64 {
+        match (self.full_scale_given, frame) {
+            (false, AnyFrame::U8(_)) => u8::FULL_SCALE,
+            (false, AnyFrame::U16(_)) => u16::FULL_SCALE,
+            _ => self.options.full_scale,
+        }
+    }
+
+    /// Continues a saved filter if it has these options. The full scale depends on the frames and is compared
+    /// with the next one.
+    fn resume(&mut self, filter: Filter, dtype: Option<&'static str>) -> Result<()> {
+        let same = |saved: &FlowFilterOptions| {
+            let mut mine = self.options.clone();
+            (mine.threads, mine.simd, mine.full_scale) = (saved.threads, saved.simd, saved.full_scale);
+            mine == *saved
+        };
+        if !each!(&filter, filter => same(filter.options()), true) {
+            return Err(Error::argument("path", "a state of a filter with the same options", "other options"));
+        }
+        let threads = self.options.threads;
+        self.filter = match filter {
+            Filter::Empty => Filter::Empty,
+            Filter::Single(filter) => Filter::Single(filter.with_threads(threads)),
+            Filter::Double(filter) => Filter::Double(filter.with_threads(threads)),
+        };
+        self.dtype = dtype;
+        Ok(())
+    }
+}
+
+/// Whether a saved filter works in double precision.
+fn is_double<R: Read + Seek>(mut reader: NpzReader<R>) -> Result<bool> {
+    let saved = SavedFilter::describe(&mut reader)?;
+    Ok(saved.is_some_and(|saved| saved.precision == f64::DTYPE))
+}
+
+fn advance<T: SimdReal + Element>(
+    filter: &mut FlowFilter<T>,
+    preprocess: &Preprocess,
+    frame: &AnyFrame,
+) -> Result<FlowField<T>> {
+    let prepared = filter.options().threads.install(|| preprocess.apply(frame.to_real()));
+    filter.push(&prepared)
+}
