@@ -73,7 +73,7 @@ pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<
         return Err(Error::argument("patches", format!("windows of at least {MIN_WINDOW_SIDE} px"), size));
     }
     let windows = Windows::new(&field.layout, region, size);
-    let sites = windows.sites(field, region);
+    let sites = windows.pixels_of_windows(field, region);
     let fitted: Vec<_> = Threads::default()
         .install(|| sites.par_iter().enumerate().map(|(k, sites)| windows.fit(field, k, sites)).collect());
     let mut out = FieldPatches { common: crate::motion3d::field::of_field(field), ..FieldPatches::default() };
@@ -122,7 +122,7 @@ impl Windows {
     }
 
     /// Valid sites of each window.
-    fn sites<T: Real>(&self, field: &FlowField<T>, region: Option<Rect>) -> Vec<Vec<usize>> {
+    fn pixels_of_windows<T: Real>(&self, field: &FlowField<T>, region: Option<Rect>) -> Vec<Vec<usize>> {
         let mut out = vec![Vec::new(); self.columns * self.rows];
         for site in 0..field.len() {
             if !field.status[site].is_valid() || field.status[site] == Status::Inconsistent {

@@ -4,7 +4,8 @@
 //! explain a flow field,
 //!
 //! ```text
-//! f_k = nu_k G_k u + R_k w        plane: G = [[1, 0, -x], [0, 1, -y]],  R = [[-xy, 1 + x^2, -y], [-(1 + y^2), xy, x]]
+//! f_k = nu_k G_k u + R_k w
+//! plane: G = [[1, 0, -x], [0, 1, -y]],  R = [[-xy, 1 + x^2, -y], [-(1 + y^2), xy, x]]
 //! ```
 //!
 //! Maximum likelihood minimises the part of the flow residual across the epipolar lines. Its covariance is
@@ -20,18 +21,22 @@
 //! velocity is `-u`. Camera axes: x right, y down, z forward. Inverse depths are in units of `|u|` per frame.
 //!
 //! The data pass `model` (rows of unit noise), `robust` (outliers; it searches with `solver` and `kernels`),
-//! `fit` (minima and weights, by `solver`) and `diagnostics` (covariance, status, report); `estimate` is the entry
-//! point. `patches` does the same for affine flow, `field` and `field_patches` take points and windows of flow
-//! fields, `bound` predicts covariances, `lateral` is the closed form without rotation.
+//! `fit` (minima and weights, by `solver`) and `diagnostics` (covariance, status, report); `estimate` is the
+//! entry point. `patches` does the same for affine flow, `field` and `field_patches` take points and windows
+//! of flow fields, `bound` predicts covariances, `lateral` is the closed form without rotation.
 //!
 //! ```
 //! use jacoflow::motion3d::{Flow, Method, Motion, MotionOptions, Noise, Placement, Status, estimate_motion};
 //! # fn main() -> jacoflow::Result<()> {
 //! let truth = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
-//! let points: Vec<[f64; 2]> = (0..60).map(|k| [f64::from(k % 8) * 0.1 - 0.35, f64::from(k / 8) * 0.1 - 0.35]).collect();
-//! let flow: Vec<[f64; 2]> = points.iter().enumerate().map(|(k, &p)| truth.plane_flow(p, 0.6 + 0.4 * (k as f64).sin())).collect();
-//! let options = MotionOptions { method: Method::Efficient, placement: Placement::Start, ..MotionOptions::default() };
-//! let found = estimate_motion(&Flow::Plane { points: &points, flow: &flow, camera: None }, &Noise::Sigma(1e-4), &options)?;
+//! let place = |k: u32| [f64::from(k % 8) * 0.1 - 0.35, f64::from(k / 8) * 0.1 - 0.35];
+//! let points: Vec<[f64; 2]> = (0..60).map(place).collect();
+//! let inverse_depth = |k: usize| 0.6 + 0.4 * (k as f64).sin();
+//! let flow: Vec<_> = (0..60).map(|k| truth.plane_flow(points[k], inverse_depth(k))).collect();
+//! let flow = Flow::Plane { points: &points, flow: &flow, camera: None };
+//! let options =
+//!     MotionOptions { method: Method::Efficient, placement: Placement::Start, ..MotionOptions::default() };
+//! let found = estimate_motion(&flow, &Noise::Sigma(1e-4), &options)?;
 //! assert_eq!(found.status, Status::Ok);
 //! assert!(found.motion.angle_to(&truth) < 1e-3);
 //! # Ok(())

@@ -9,7 +9,7 @@ use nalgebra::{Matrix3, Vector3};
 const AXES: [[f64; 3]; 4] = [[0.6, -0.64, 0.48], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-0.8, 0.0, 0.6]];
 
 /// A motion that turns by `turn` rad about one of the axes.
-fn turning(axis: usize, turn: f64) -> Motion {
+fn rotating(axis: usize, turn: f64) -> Motion {
     Motion::new([0.6, 0.2, 0.75], AXES[axis].map(|value| turn * value))
 }
 
@@ -85,7 +85,7 @@ fn off(found: &Motion, truth: &Motion) -> f64 {
 #[test]
 fn two_exact_views_give_the_exact_motion_and_depths() {
     for (axis, turn, scale) in [(0, 0.3, 0.2), (1, 0.3, 0.02), (2, 0.2, 0.1), (3, 0.1, 0.2), (0, 0.02, 0.02)] {
-        let truth = turning(axis, turn);
+        let truth = rotating(axis, turn);
         let seen = views(&truth, 200, 3, |_, r| scale * (0.5 + r));
         for method in [Method::MaximumLikelihood, Method::Efficient] {
             for (noise, robust) in [
@@ -109,7 +109,7 @@ fn two_exact_views_give_the_exact_motion_and_depths() {
 /// way, but for which points are neighbours.
 #[test]
 fn slow_displacements_are_placed_half_way_and_left_alone() {
-    let truth = turning(0, 0.02);
+    let truth = rotating(0, 0.02);
     let seen = views(&truth, 300, 3, |_, r| 0.02 * (0.5 + r)).noisy(6e-4, 5);
     let options = MotionOptions { method: Method::MaximumLikelihood, ..MotionOptions::default() };
     let found = seen.run(&Noise::Sigma(6e-4), &options);
@@ -127,7 +127,7 @@ fn covariances_of_fast_turns_hold() {
     for (robust, share) in [(false, 0.0), (true, 0.3)] {
         let (mut held, mut ok) = (0, 0);
         for seed in 0..60 {
-            let truth = turning(seed as usize % 4, 0.12 + 0.13 * (seed % 3) as f64 / 2.0);
+            let truth = rotating(seed as usize % 4, 0.12 + 0.13 * (seed % 3) as f64 / 2.0);
             let seen = views(&truth, 400, seed, |_, r| 0.02 * (0.5 + r)).noisy(4e-4, 100 + seed);
             let seen = seen.with_outliers(share, 200 + seed);
             let found = seen.run(&Noise::Sigma(4e-4), &MotionOptions { robust, ..MotionOptions::default() });
@@ -192,7 +192,7 @@ fn fast_turns_without_translation_are_told() {
     for turn in [0.15, 0.3] {
         for (robust, share) in [(false, 0.0), (true, 0.3)] {
             for seed in 0..6 {
-                let truth = turning(seed as usize % 4, turn);
+                let truth = rotating(seed as usize % 4, turn);
                 let seen =
                     views(&truth, 300, seed, |_, _| 0.0).noisy(1e-4, 100 + seed).with_outliers(share, 200 + seed);
                 for noise in [Noise::Sigma(1e-4), Noise::Unknown] {
@@ -210,7 +210,7 @@ fn fast_turns_without_translation_are_told() {
 #[test]
 fn a_plane_has_two_exact_motions() {
     for (turn, scale) in [(0.02, 0.02), (0.25, 0.02), (0.25, 0.15)] {
-        let truth = turning(0, turn);
+        let truth = rotating(0, turn);
         let seen = views(&truth, 300, 3, |[x, y], _| scale * (0.9 + 0.3 * x - 0.2 * y));
         let found = seen.run(&Noise::Sigma(1e-7), &MotionOptions::default());
         assert_eq!(found.status, Status::Ambiguous);
@@ -231,7 +231,7 @@ fn a_plane_has_two_exact_motions() {
 #[test]
 fn exact_patches_give_the_exact_motion() {
     for (turn, scale) in [(0.02, 0.02), (0.3, 0.02), (0.3, 0.2)] {
-        let truth = turning(0, turn);
+        let truth = rotating(0, turn);
         let rng = CounterRng::new(7);
         let (mut points, mut motion) = (Vec::new(), Vec::new());
         for k in 0..12 {

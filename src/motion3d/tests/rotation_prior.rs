@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 const DEVIATION: f64 = 0.003;
 
 /// A scene, and its rotation as it is known: by chance, and in addition `off` deviations beside.
-fn told(seed: u64, off: f64) -> (Scene, RotationPrior) {
+fn estimate_with_prior(seed: u64, off: f64) -> (Scene, RotationPrior) {
     let scene = Scene::new(oblique(), 300, 0.6, 0.01, seed, |x, y, _| smooth(x, y));
     let rng = CounterRng::new(seed).stream(9);
     let axis = |j: u64| Vector3::from_fn(|i, _| rng.normal(3 * j + i as u64));
@@ -35,10 +35,10 @@ fn flow_that_speaks_against_a_known_rotation_is_heard() {
         };
         let (mut wide, mut nearer) = (Held::default(), 0);
         for seed in 0..20 {
-            let (scene, prior) = told(seed, 0.0);
+            let (scene, prior) = estimate_with_prior(seed, 0.0);
             let found = run(&scene, Some(prior));
             assert_eq!(found.status, Status::Ok, "{method:?} {robust} {known} {seed}");
-            let (scene, prior) = told(seed, 15.0);
+            let (scene, prior) = estimate_with_prior(seed, 15.0);
             let found = run(&scene, Some(prior));
             assert_eq!(found.status, Status::Ambiguous, "{method:?} {robust} {known} {seed}");
             wide.count(&found, &scene.motion);
@@ -58,7 +58,7 @@ fn flow_that_speaks_against_a_known_rotation_is_heard() {
 #[test]
 fn a_wrong_rotation_hides_no_translation_in_unknown_noise() {
     for seed in 0..10 {
-        let (scene, prior) = told(seed, 50.0);
+        let (scene, prior) = estimate_with_prior(seed, 50.0);
         let options =
             MotionOptions { rotation_prior: Some(prior), placement: Placement::Start, ..MotionOptions::default() };
         let found = estimate_motion(&scene.flow(), &Noise::Unknown, &options).unwrap();
@@ -73,7 +73,7 @@ fn a_wrong_rotation_that_is_told_surely_does_not_hide_itself() {
     for noise in [Noise::Sigma(0.01), Noise::Unknown] {
         for deviation in [1e-3, 1e-4, 1e-5] {
             for seed in 0..10 {
-                let (scene, mut prior) = told(seed, 15.0);
+                let (scene, mut prior) = estimate_with_prior(seed, 15.0);
                 let shape = |i: usize, j: usize| if i == j { deviation * deviation } else { 0.0 };
                 prior.covariance = std::array::from_fn(|i| std::array::from_fn(|j| shape(i, j)));
                 let options = MotionOptions {
@@ -93,7 +93,7 @@ fn a_wrong_rotation_that_is_told_surely_does_not_hide_itself() {
 fn a_rotation_alone_that_speaks_against_the_known_one_is_as_unsure() {
     let still = |seed| Scene::new(oblique(), 300, 0.6, 0.01, seed, |_, _, _| 0.0);
     for seed in 0..10 {
-        let (scene, (_, prior)) = (still(seed), told(seed, 15.0));
+        let (scene, (_, prior)) = (still(seed), estimate_with_prior(seed, 15.0));
         let run = |rotation_prior| {
             let options = MotionOptions { rotation_prior, placement: Placement::Start, ..MotionOptions::default() };
             estimate_motion(&scene.flow(), &Noise::Unknown, &options).unwrap()
