@@ -464,7 +464,6 @@ fn options_are_checked_by_name() {
     assert!(refused(WindowedOptions { frames: 4, ..base() }).starts_with("frames"));
     assert!(refused(WindowedOptions { frames: 2, rows: RowSet::All, ..base() }).starts_with("rows"));
     assert!(refused(WindowedOptions { presmooth: Some(-1.0), ..base() }).starts_with("presmooth"));
-    assert!(refused(WindowedOptions { min_weight: 2.0, ..base() }).starts_with("min_weight"));
     assert!(RowSet::parse("rows").unwrap_err().to_string().starts_with("rows"));
     for set in RowSet::EVERY {
         assert_eq!(RowSet::parse(set.name()).unwrap(), set);

@@ -187,7 +187,7 @@ impl Method {
             Self::CoarseToFine(options) => correlation_length(options.frames),
             Self::Instantaneous(o) => o.neighbourhood.spread(),
             Self::Windowed(o) => {
-                let smoothing = o.presmooth.or(o.already_smoothed).unwrap_or(0.0);
+                let smoothing = o.presmooth.unwrap_or(0.0);
                 o.sigma.hypot(o.neighbourhood.spread()).hypot(smoothing)
             }
             Self::LucasKanade(o) => match o.window {

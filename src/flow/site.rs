@@ -89,11 +89,12 @@ impl MaskCounts {
         Self { width, sums }
     }
 
-    /// Whether any pixel within `reach` of `(x, y)` is masked. The reach must fit.
+    /// Whether any pixel of the frame within `reach` of `(x, y)` is masked.
     pub fn touches(&self, (x, y): (usize, usize), reach: Reach) -> bool {
         let at = |x: usize, y: usize| self.sums[y * (self.width + 1) + x];
-        let (x0, x1) = (x - reach.left, x + reach.right + 1);
-        let (y0, y1) = (y - reach.up, y + reach.down + 1);
+        let height = self.sums.len() / (self.width + 1) - 1;
+        let (x0, x1) = (x.saturating_sub(reach.left), (x + reach.right + 1).min(self.width));
+        let (y0, y1) = (y.saturating_sub(reach.up), (y + reach.down + 1).min(height));
         at(x1, y1) + at(x0, y0) != at(x0, y1) + at(x1, y0)
     }
 }

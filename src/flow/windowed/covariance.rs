@@ -1,4 +1,4 @@
-//! Covariance of the windowed estimate.
+//! Covariance of the windowed estimate: sums over windows, tile by tile.
 //!
 //! To first order the error of `m = N^-1 sum_p w T_p^T A_p^T b_p` is `N^-1 sum_p w T_p^T A_p^T r_p`, `r_p`
 //! what noise leaves in the pixel's equations. Stencils and smoothing spread the noise of one sample over
@@ -13,27 +13,26 @@
 //! q`, and the squared weights are those of a Gaussian of variance `a w2`, times `a` for each axis. The
 //! stencil's few pixels are taken to be one place.
 //!
-//! Three things draw the estimate away from the truth in a known direction: noise in the coefficients towards
+//! Three biases have a known direction: noise in the coefficients towards
 //! zero, by `N^-1 s2 (sum_p w T^T C T) m` with C the noise's own `E[dA^T dA]`; truncation
-//! ([`super::misfit`]); and flow that is not affine in the window ([`super::misfit_planes`]). None is
+//! ([`super::truncation`]); and flow that is not affine in the window ([`super::bias_planes`]). None is
 //! subtracted; the outer product of the first two's sum is added and that of the third, so that the
 //! covariance is that of the whole error.
 //!
 //! Unless the noise is given, its variance is read from the highest frequencies of the frames
-//! ([`super::detail`]), where motion and misfit hardly show. The residual gives another, its sum of squares
+//! ([`super::high_frequencies`]), where motion and misfit hardly show. The residual gives another, its sum of squares
 //! over its expectation `c0 sum w - tr(N^-1 S)`, which misfit can only raise: so the variance is never more
 //! than what chance allows beyond that, and where the residual is that much larger than noise and truncation
 //! explain, at motion boundaries or changes of lighting, it widens the covariance.
 
+use super::bias_planes::{self, Ring};
 use super::covariance_kernels::{Outer, Pass, Scatter, Weigh};
-use super::detail::Detail;
 use super::estimate::Strip;
-use super::hidden;
-use super::misfit_planes::{self as misfit, Ring};
+use super::high_frequencies::HighFrequencies;
+use super::noise_dominated;
 use super::noise_setting::NoiseSetting;
 use super::sandwich::Sandwich;
 use super::solve::MomentRow;
-use super::sound;
 use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
 use crate::flow::symmetric::ENTRIES;
 use crate::simd::{SimdReal, dispatch};
@@ -49,7 +48,7 @@ impl<T: SimdReal> NoiseSetting<T> {
     /// frames; with `parts` 21 more, what is left of it without the noise.
     pub fn covariance(
         &self,
-        (source, detail): (&Source<'_, T>, Option<&Detail<T>>),
+        (source, detail): (&Source<'_, T>, Option<&HighFrequencies<T>>),
         strip: &Strip<T>,
         rows: &[usize],
         columns: &Range<usize>,
@@ -121,7 +120,7 @@ impl<T: SimdReal> Scratch<T> {
 
 /// Rows of `Scratch::pixel`.
 const PIXEL: usize = PIXEL_NOISE + ENTRIES;
-/// Where the noise's own part of the result begins, for those who want to tell it apart.
+/// Where the noise's part of the result begins.
 pub(super) const PIXEL_NOISE: usize = PIXEL_SHARE + 2;
 /// Where the noise's share of the equations stands, and the variance of the noise.
 pub(super) const PIXEL_SHARE: usize = PIXEL_RESULT + ENTRIES;
@@ -134,7 +133,7 @@ pub(super) const PIXEL_MISFIT: usize = ENTRIES + 6 + 2 + 6;
 struct BandTask<'a, 'b, T> {
     setting: &'a NoiseSetting<T>,
     source: &'a Source<'a, T>,
-    detail: Option<&'a Detail<T>>,
+    detail: Option<&'a HighFrequencies<T>>,
     strip: &'a Strip<T>,
     scratch: &'a mut Scratch<T>,
     rows: &'a [usize],
@@ -173,8 +172,8 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
                 if !self.source.support.is_whole() {
                     usable_sums.sum(level, window, usable, (0, 2, 0), centres);
                 }
-                for p in 0..misfit::PLANES + if self.detail.is_some() { 2 } else { 0 } {
-                    let (order, base) = misfit::place(p);
+                for p in 0..bias_planes::PLANES + if self.detail.is_some() { 2 } else { 0 } {
+                    let (order, base) = bias_planes::place(p);
                     misfit_sums.sum(level, window, misfit, (p, order, base), centres);
                 }
                 for g in 0..rows.len() {
@@ -265,16 +264,16 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         let Scratch { jets, ring, misfit, .. } = &mut **scratch;
         let radius = setting.window.radius();
         let (width, height) = (padded(TILE_COLUMNS + 2 * radius), bottom - top + 1 + 2 * radius);
-        misfit.resize(misfit::PLANES + if detail.is_some() { 2 } else { 0 }, width, height);
+        misfit.resize(bias_planes::PLANES + if detail.is_some() { 2 } else { 0 }, width, height);
         let corner = (left as isize - radius as isize, top as isize - radius as isize);
         let kind = (setting.level, setting.rows);
         ring.fill(kind, &setting.truncation, (source, strip), jets, (corner, setting.scale), misfit);
         let Some(detail) = detail else { return };
         for r in 0..height {
             let y = corner.1 + r as isize;
-            let at = misfit.at(misfit::PLANES, r, 0);
+            let at = misfit.at(bias_planes::PLANES, r, 0);
             source.support.weights(corner.0, y, &mut misfit.data[at..at + width]);
-            let other = misfit.at(misfit::PLANES + 1, r, 0);
+            let other = misfit.at(bias_planes::PLANES + 1, r, 0);
             let (energy, known) = misfit.data.split_at_mut(other);
             detail.row(corner.0, y, &mut energy[at..at + width], &mut known[..width]);
         }
@@ -289,8 +288,7 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         let row = MomentRow { data: &sums.data, first: g * TILE_COLUMNS, stride: GROUP_ROWS * TILE_COLUMNS };
         dispatch(setting.level, Sandwich { setting, row, pixel });
         let (width, count) = (self.columns.len(), (self.columns.end - left).min(TILE_COLUMNS));
-        hidden::widen_row(&setting.pixel, setting.scale, pixel, count);
-        sound::mend_row(setting.scale, pixel, count);
+        noise_dominated::inflate_row(&setting.pixel, setting.scale, pixel, count);
         let from = j * width + left - self.columns.start;
         for (k, plane) in self.out.iter_mut().enumerate() {
             let pixel = &self.scratch.pixel;
@@ -332,15 +330,15 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         let Scratch { misfit_sums, pixel, .. } = &mut **scratch;
         let moment = |k: usize| &misfit_sums.data[(k * GROUP_ROWS + g) * TILE_COLUMNS..][..TILE_COLUMNS];
         for p in 0..12 {
-            let (first, i) = (p / 6 * misfit::SCORE, p % 6);
+            let (first, i) = (p / 6 * bias_planes::SCORE, p % 6);
             let target = &mut pixel[(PIXEL_MISFIT + p) * TILE_COLUMNS..][..TILE_COLUMNS];
             target.copy_from_slice(moment(first + 3 * (i % 2) + i / 2));
             if i > 1 {
                 target.iter_mut().zip(moment(first + 4 + i)).for_each(|(sum, own)| *sum += *own);
             }
         }
-        for p in 12..misfit::PLANES + if detail.is_some() { 2 } else { 0 } {
-            pixel[(PIXEL_MISFIT + p) * TILE_COLUMNS..][..TILE_COLUMNS].copy_from_slice(moment(misfit::place(p).1));
+        for p in 12..bias_planes::PLANES + if detail.is_some() { 2 } else { 0 } {
+            pixel[(PIXEL_MISFIT + p) * TILE_COLUMNS..][..TILE_COLUMNS].copy_from_slice(moment(bias_planes::place(p).1));
         }
     }
 }

@@ -1,6 +1,5 @@
 //! The estimate itself: moments, normal equations, solution and status of every pixel of a strip of rows.
 
-use super::floor;
 use super::rows::Plan;
 use super::solve::{Deficient, MomentRow, decompose, normal_matrix, right_side};
 use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
@@ -15,6 +14,11 @@ use std::ops::Range;
 /// Rows of one parallel task, at most; fixed, and each pixel's result depends on its own window only, so
 /// threads cannot change it.
 const TASK_ROWS: usize = 64;
+/// Smallest share of a (squared) column that is independent of the others where an unknown counts as
+/// determined.
+const RANK_TOLERANCE: f64 = 1e-5;
+/// Smallest share of the window's weight on usable pixels.
+const MIN_WEIGHT: f64 = 0.1;
 
 /// What the estimate needs beside the images.
 pub(super) struct Setting<T> {
@@ -26,11 +30,7 @@ pub(super) struct Setting<T> {
     pub rows: usize,
     /// What to do with undetermined unknowns.
     pub policy: RankPolicy,
-    /// Least independent share of a column.
-    pub tolerance: f64,
-    /// Least share of the window's weight.
-    pub min_weight: f64,
-    /// Sums of squared gradients above this are more than rounding noise; below it the samples around tell.
+    /// Largest sum of squared gradients that rounding leaves of a constant image.
     pub floor: f64,
     /// Instruction set.
     pub level: Level,
@@ -281,7 +281,7 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
             };
             band.weight[out] = T::from_f64(weight);
             let mut status = source.support.status(x, y);
-            if status == Status::Ok && weight < setting.min_weight {
+            if status == Status::Ok && weight < MIN_WEIGHT {
                 status = source.support.lack(x, y, setting.window.radius());
             }
             band.status[out] = status;
@@ -291,12 +291,7 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
             }
             let quality = solved[6 * TILE_COLUMNS + c].to_f64();
             let largest = solved[7 * TILE_COLUMNS + c].to_f64();
-            let floor = if largest > setting.floor {
-                setting.floor
-            } else {
-                floor::about(&source.frames, (x, y), setting.window.radius(), source.reach)
-            };
-            let determined = quality >= setting.tolerance && largest > floor;
+            let determined = quality >= RANK_TOLERANCE && largest > setting.floor;
             if determined {
                 band.rank[out] = 6;
             } else {
@@ -309,7 +304,7 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
                 MomentRow { data: &scratch.moments.data, first: g * TILE_COLUMNS, stride: GROUP_ROWS * TILE_COLUMNS };
             let n = normal_matrix::<T, T>(plan, &row, c);
             let right = right_side::<T, T>(plan, &row, c);
-            let Deficient { rank, solution, condition } = decompose(&n, &right, setting.tolerance, floor);
+            let Deficient { rank, solution, condition } = decompose(&n, &right, RANK_TOLERANCE, setting.floor);
             if let Some(plane) = &mut band.condition {
                 plane[out] = T::from_f64(condition);
             }

@@ -5,7 +5,7 @@
 //! and linear in m; both views are needed.
 
 use super::combine::Combination;
-use super::misfit::{DERIVATIVES, Truncation};
+use super::truncation::{DERIVATIVES, Truncation};
 use crate::flow::moment_filter::weights;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::jet::JetStencil;

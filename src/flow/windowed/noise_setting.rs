@@ -1,17 +1,17 @@
-//! What the covariance needs beside the estimates.
+//! Constants of the covariance: moments of the noise, windows, truncation.
 
 use super::combine::Combination;
-use super::detail;
-use super::misfit::Truncation;
+use super::high_frequencies;
 use super::noise::{PixelNoise, smoothing_weights};
 use super::options::WindowedOptions;
 use super::rows::Plan;
+use super::truncation::Truncation;
 use super::window::Window;
 use crate::flow::options::EstimatorOptions;
 use crate::jet::JetStencil;
 use crate::simd::{Level, SimdReal};
 
-/// What the covariance needs beside the estimates.
+/// Constants of the covariance.
 pub(super) struct NoiseSetting<T> {
     /// Second moments of the noise.
     pub pixel: PixelNoise,
@@ -31,14 +31,13 @@ pub(super) struct NoiseSetting<T> {
     pub rows: usize,
     /// Variance of the pixel noise; `None`: from the frames.
     pub variance: Option<f64>,
-    /// Least variance that is believed of the frames: that of rounding to whole grey levels, where they hold
-    /// nothing else.
-    pub least_variance: f64,
+    /// Smallest variance of the pixel noise: that of rounding, for frames of whole grey levels.
+    pub min_variance: f64,
     /// What truncation leaves.
     pub truncation: Truncation,
-    /// Energy of the detail per variance of the noise.
-    pub detail_gain: f64,
-    /// Whether the noise's own part of the covariance is told apart.
+    /// Energy of the high frequencies per variance of the noise.
+    pub high_frequency_gain: f64,
+    /// Whether the noise's part of the covariance is reported, too.
     pub parts: bool,
     /// Instruction set.
     pub level: Level,
@@ -54,10 +53,7 @@ impl<T: SimdReal> NoiseSetting<T> {
         frames: usize,
     ) -> Self {
         let combination = Combination::of(frames, options.scheme);
-        let smooth = match (options.presmooth, options.already_smoothed) {
-            (Some(a), Some(b)) => Some(a.hypot(b)),
-            (a, b) => a.or(b),
-        };
+        let smooth = options.presmooth;
         let reach = stencil.reach();
         // The window leaves of the kernel only what it weighs alike.
         let narrowed = smooth.map(|s| s * options.sigma / options.sigma.hypot(s));
@@ -73,9 +69,9 @@ impl<T: SimdReal> NoiseSetting<T> {
             scale: 1.0 / options.sigma,
             rows,
             truncation,
-            detail_gain: detail::gain(combination, options.already_smoothed),
+            high_frequency_gain: high_frequencies::gain(combination),
             variance: common.noise.map(|n| n * n),
-            least_variance: if rounded { 1.0 / 12.0 } else { 0.0 },
+            min_variance: if rounded { 1.0 / 12.0 } else { 0.0 },
             parts: common.systematic,
             level: common.level(),
         }

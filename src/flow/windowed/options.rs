@@ -1,4 +1,4 @@
-//! What the windowed estimator may be told.
+//! Options of the windowed estimator.
 
 use crate::error::{Error, Result};
 use crate::flow::RankPolicy;
@@ -79,20 +79,11 @@ pub struct WindowedOptions {
     /// Pixels that each jet is fitted to. Default 3x3.
     pub neighbourhood: Neighbourhood,
     /// Standard deviation of a Gaussian that the estimator smooths the frames with first, px; the covariance
-    /// knows of it. Default 1.5: a 3x3 fit of a texture as fine as the pixels is no derivative, and halves
-    /// the flow of sharp particles. Frames smoothed beforehand should be declared by
-    /// [`WindowedOptions::already_smoothed`] instead.
+    /// holds it. Default 1.5: a 3x3 fit of a texture as fine as the pixels is no derivative, and halves the
+    /// flow of sharp particles.
     pub presmooth: Option<f64>,
-    /// The frames come already smoothed by a Gaussian of this standard deviation, px: nothing is smoothed,
-    /// but the covariance takes their noise for correlated accordingly. Default `None`.
-    pub already_smoothed: Option<f64>,
     /// What to report where the window does not determine every unknown. Default: NaN.
     pub rank_deficient: RankPolicy,
-    /// An unknown counts as undetermined when less than this share of its (squared) column is independent of
-    /// the other columns. Default 1e-5.
-    pub rank_tolerance: f64,
-    /// Least share of the window's weight that usable pixels must hold. Default 0.1.
-    pub min_weight: f64,
 }
 
 impl Default for WindowedOptions {
@@ -105,10 +96,7 @@ impl Default for WindowedOptions {
             scheme: TimeScheme::default(),
             neighbourhood: Neighbourhood::default(),
             presmooth: Some(1.5),
-            already_smoothed: None,
             rank_deficient: RankPolicy::default(),
-            rank_tolerance: 1e-5,
-            min_weight: 0.1,
         }
     }
 }
@@ -121,7 +109,7 @@ impl WindowedOptions {
 }
 
 /// Largest window radius, px.
-const LARGEST_RADIUS: f64 = 256.0;
+const MAX_RADIUS: f64 = 256.0;
 
 impl WindowedOptions {
     /// Refuses values that no window can have.
@@ -138,14 +126,11 @@ impl WindowedOptions {
         };
         positive("sigma", self.sigma)?;
         positive("truncate", self.truncate)?;
-        positive("rank_tolerance", self.rank_tolerance)?;
-        for (name, value) in [("presmooth", self.presmooth), ("already_smoothed", self.already_smoothed)] {
-            if let Some(value) = value {
-                positive(name, value)?;
-            }
+        if let Some(value) = self.presmooth {
+            positive("presmooth", value)?;
         }
-        if self.sigma < 0.5 || self.sigma * self.truncate > LARGEST_RADIUS || self.sigma * self.truncate < 1.0 {
-            let want = format!("at least 0.5 px, and with truncate a radius of 1 to {LARGEST_RADIUS} px");
+        if self.sigma < 0.5 || self.sigma * self.truncate > MAX_RADIUS || self.sigma * self.truncate < 1.0 {
+            let want = format!("at least 0.5 px, and with truncate a radius of 1 to {MAX_RADIUS} px");
             return Err(Error::argument("sigma", want, format!("{:?} (truncate {:?})", self.sigma, self.truncate)));
         }
         if !(2..=3).contains(&self.frames) {
@@ -153,9 +138,6 @@ impl WindowedOptions {
         }
         if self.frames < self.rows.frames_needed() {
             return Err(Error::argument("rows", "brightness, gradient or jet for a pair of frames", self.rows.name()));
-        }
-        if !(0.0..=1.0).contains(&self.min_weight) {
-            return Err(Error::argument("min_weight", "a share from 0 to 1", self.min_weight));
         }
         Ok(())
     }

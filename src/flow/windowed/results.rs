@@ -3,6 +3,7 @@
 use super::estimate::Strip;
 use super::run::Job;
 use crate::flow::site::FieldBand;
+use crate::flow::symmetric::upper;
 use crate::simd::SimdReal;
 use crate::types::{SamplingGrid, Status};
 use rayon::prelude::*;
@@ -69,7 +70,7 @@ impl<T: SimdReal> Results<T> {
             for (k, plane) in band.covariance.iter_mut().chain(&mut band.systematic).enumerate() {
                 run.copy(&covariance.planes, k * n + from, &mut plane[places.clone()]);
             }
-            withdraw_what_overflowed(band, places.clone());
+            withdraw_unusable(band, places.clone());
         }
         if let Some(plane) = &mut band.residual {
             let rows = T::from_f64(job.setting.rows as f64);
@@ -87,11 +88,12 @@ impl<T: SimdReal> Results<T> {
     }
 }
 
-/// An estimate whose covariance is beyond the precision is none.
-fn withdraw_what_overflowed<T: SimdReal>(band: &mut FieldBand<'_, T>, places: Range<usize>) {
+/// Withdraws estimates whose covariance overflowed or lost a variance to rounding.
+fn withdraw_unusable<T: SimdReal>(band: &mut FieldBand<'_, T>, places: Range<usize>) {
     for place in places {
-        let known = band.covariance.iter().all(|plane| plane[place].finite());
-        if !known && band.status[place].is_valid() {
+        let is_finite = band.covariance.iter().all(|plane| plane[place].finite());
+        let is_negative = (0..6).any(|i| band.covariance[upper(i, i)][place] < T::default());
+        if (!is_finite || is_negative) && band.status[place].is_valid() {
             band.status[place] = Status::NonFinite;
             band.motion.iter_mut().chain(&mut band.covariance).for_each(|plane| plane[place] = T::nan());
         }

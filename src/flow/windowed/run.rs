@@ -1,9 +1,8 @@
 //! From frames and options to a filled field: cropping, smoothing, strips, sites.
 
 use super::combine::Combination;
-use super::detail::Detail;
 use super::estimate::{Setting, Strip};
-use super::floor;
+use super::high_frequencies::HighFrequencies;
 use super::noise_setting::NoiseSetting;
 use super::options::WindowedOptions;
 use super::results::{Covariance, Results, Run};
@@ -25,7 +24,7 @@ use std::ops::Range;
 /// Site rows whose results are held at a time; a multiple of [`BAND_ROWS`].
 const STRIP_ROWS: usize = 16 * BAND_ROWS;
 /// A cropped frame is at least this wide where the frame is, so that every crop runs the same vector code.
-const LEAST_CROP: usize = 64;
+const MIN_CROP: usize = 64;
 
 /// The estimator behind the options.
 #[derive(Debug)]
@@ -140,7 +139,7 @@ pub(super) struct Job<'a, T: Clone> {
     pub setting: Setting<T>,
     noise: Option<NoiseSetting<T>>,
     /// What the noise is read from, unless it is given.
-    detail: Option<Detail<T>>,
+    detail: Option<HighFrequencies<T>>,
 }
 
 impl<'a, T: SimdReal> Job<'a, T> {
@@ -160,7 +159,7 @@ impl<'a, T: SimdReal> Job<'a, T> {
         let spread = owner.smoother.as_ref().map_or(0, GaussianSmoother::radius);
         let support = Support::new(&plain, mask.as_deref(), owner.stencil.reach(), spread);
         let combination = Combination::of(frames.len(), options.scheme);
-        let detail = (common.covariance && common.noise.is_none()).then(|| Detail::new(&plain, combination));
+        let detail = (common.covariance && common.noise.is_none()).then(|| HighFrequencies::new(&plain, combination));
         let frames = match &owner.smoother {
             Some(s) => frames.iter().map(|f| Cow::Owned(s.apply_at(common.level(), f))).collect(),
             None => frames,
@@ -171,9 +170,7 @@ impl<'a, T: SimdReal> Job<'a, T> {
             scale: 1.0 / options.sigma,
             rows: options.rows.count(),
             policy: options.rank_deficient,
-            tolerance: options.rank_tolerance,
-            min_weight: options.min_weight,
-            floor: floor::of_frames(frames.iter().map(AsRef::as_ref)),
+            floor: rounding_floor(frames.iter().map(AsRef::as_ref)),
             level: common.level(),
             inverse: common.covariance,
             diagnostics: common.diagnostics,
@@ -217,13 +214,21 @@ impl<'a, T: SimdReal> Job<'a, T> {
     }
 }
 
+/// Largest sum of squared gradients that rounding leaves of a constant image as bright as the brightest
+/// finite sample.
+fn rounding_floor<'a, T: SimdReal>(frames: impl Iterator<Item = &'a Frame<T>>) -> f64 {
+    let epsilon = if size_of::<T>() == 4 { f64::from(f32::EPSILON) } else { f64::EPSILON };
+    let magnitudes = frames.flat_map(Frame::data).map(|v| v.to_f64().abs()).filter(|v| v.is_finite());
+    (8.0 * epsilon * magnitudes.fold(0.0, f64::max)).powi(2)
+}
+
 /// The rectangle with a margin, inside the frame; the whole frame where little would be saved.
 fn crop(sites: Rect, (width, height): (usize, usize), margin: usize) -> Rect {
     let span = |at: usize, len: usize, size: usize| {
         let from = at.saturating_sub(margin);
         let to = (at + len + margin).min(size);
-        let from = from.min(to.saturating_sub(LEAST_CROP));
-        (from, to.max(from + LEAST_CROP).min(size))
+        let from = from.min(to.saturating_sub(MIN_CROP));
+        (from, to.max(from + MIN_CROP).min(size))
     };
     let (x0, x1) = span(sites.x, sites.width, width);
     let (y0, y1) = span(sites.y, sites.height, height);

@@ -11,7 +11,7 @@ use crate::simd::{Kernel, Lanes, SimdReal};
 /// Fixed-point steps towards the true motion in the pull of the noise.
 const PULL_STEPS: usize = 3;
 /// Two estimates of the noise from one window may differ by so much by chance.
-const CHANCE: f64 = 1.5;
+const NOISE_RATIO: f64 = 1.5;
 /// What noise alone makes of the sum of squares of the six biases by curvature, each in units of its
 /// deviation: rarely more than this.
 const BEND_CHANCE: f64 = 6.0;
@@ -97,15 +97,15 @@ fn variances<T: SimdReal, V: Lanes<Scalar = T>>(
     }
     let (residual, weight) = (at(ENTRIES + 6), at(ENTRIES + 7));
     let [truncated, energy, known] = std::array::from_fn(|k| at(PIXEL_MISFIT + 12 + k));
-    let chance = V::constant(CHANCE);
+    let chance = V::constant(NOISE_RATIO);
     let expected = one_pixel::<V>(&setting.pixel, m) * weight;
     let left = (expected - trace).max(expected * V::constant(0.05));
     let whole = residual / left;
     let unexplained = (residual - truncated) / (left * chance);
-    let fine = energy / (known * V::constant(setting.detail_gain));
+    let fine = energy / (known * V::constant(setting.high_frequency_gain));
     let enough = (weight * V::constant(0.5)).lt(known);
     let most = whole * chance;
-    let least = V::constant(setting.least_variance);
+    let least = V::constant(setting.min_variance);
     let of_noise = V::select(enough, most.min(fine), whole).max(least);
     (of_noise, V::select(enough, most.min(fine.max(unexplained)), whole).max(least))
 }

@@ -77,7 +77,7 @@ pub(super) fn right_side<V: Lanes<Scalar = T>, T: SimdReal>(
     })
 }
 
-/// What a window whose equations leave something open still tells, in double precision.
+/// Solution of least norm of normal equations without full rank, in double precision.
 pub(super) struct Deficient {
     /// Rank of the column-scaled equations.
     pub rank: u8,

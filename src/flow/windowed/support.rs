@@ -1,5 +1,6 @@
 //! Which pixels have equations at all.
 
+use crate::flow::site::MaskCounts;
 use crate::jet::Reach;
 use crate::math::Real;
 use crate::types::{Frame, Mask, Status};
@@ -31,13 +32,13 @@ impl Support {
             up: reach.up + spread,
             down: reach.down + spread,
         };
-        let bad = |x: usize, y: usize| frames.iter().any(|f| !f.get(x, y).finite());
-        let broken = (!finite).then(|| touched(size, wide, bad));
-        let hidden = masked.map(|m| touched(size, wide, |x, y| !m.get(x, y)));
+        let is_finite = |x: usize, y: usize| frames.iter().all(|f| f.get(x, y).finite());
+        let broken = (!finite).then(|| MaskCounts::new(&Frame::from_fn(size.0, size.1, is_finite)));
+        let masked = masked.map(MaskCounts::new);
         let damage = Frame::from_fn(size.0, size.1, |x, y| {
-            if hidden.as_ref().is_some_and(|h| h.get(x, y)) {
+            if masked.as_ref().is_some_and(|counts| counts.touches((x, y), wide)) {
                 Status::Masked
-            } else if broken.as_ref().is_some_and(|b| b.get(x, y)) {
+            } else if broken.as_ref().is_some_and(|counts| counts.touches((x, y), wide)) {
                 Status::NonFinite
             } else {
                 Status::Ok
@@ -113,25 +114,6 @@ fn all_finite<T: Real>(data: &[T]) -> bool {
             }
         }
         sums.iter().all(|s| *s == zero)
-    })
-}
-
-/// Pixels whose rectangle of dependence holds a sample that is `bad`.
-fn touched((w, h): (usize, usize), reach: Reach, bad: impl Fn(usize, usize) -> bool) -> Frame<bool> {
-    // Counts of bad samples above and to the left: a rectangle's count is four look-ups.
-    let stride = w + 1;
-    let mut counts = vec![0u32; stride * (h + 1)];
-    for y in 0..h {
-        let mut row = 0;
-        for x in 0..w {
-            row += u32::from(bad(x, y));
-            counts[(y + 1) * stride + x + 1] = counts[y * stride + x + 1] + row;
-        }
-    }
-    Frame::from_fn(w, h, |x, y| {
-        let (x0, x1) = (x.saturating_sub(reach.left), (x + reach.right + 1).min(w));
-        let (y0, y1) = (y.saturating_sub(reach.up), (y + reach.down + 1).min(h));
-        counts[y1 * stride + x1] + counts[y0 * stride + x0] > counts[y0 * stride + x1] + counts[y1 * stride + x0]
     })
 }
 

@@ -1,5 +1,5 @@
-//! The misfit of a tile: what truncation, and flow that is not affine, leave in the equations of each pixel,
-//! ready to be summed over windows.
+//! Planes of the biases: what truncation, and flow that is not affine, leave in the equations of each pixel,
+//! to be summed over windows.
 //!
 //! The window's one affine motion `T_p m` is not the motion at its pixel p. By how much that draws the
 //! estimate aside can be seen from the estimates themselves: with the motion found at p in place of the one
@@ -9,9 +9,9 @@
 //! times its Laplacian.
 
 use super::estimate::Strip;
-use super::misfit::{DERIVATIVES, DIFFERENCED, MIXED, Truncation, residual};
 use super::noise::columns;
 use super::tile::{JetTile, Planes, Source, padded};
+use super::truncation::{DERIVATIVES, DIFFERENCED, MIXED, Truncation, residual};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 
 /// Planes of a tile: `P^T r` for the six unknowns, `P^T P m` for the six, then `r^T r`.

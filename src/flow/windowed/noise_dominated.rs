@@ -1,8 +1,8 @@
-//! Directions of the motion that only noise seems to determine.
+//! Inflates the covariance along directions of the motion that only noise determines.
 //!
 //! Noise has gradients of its own. On average it adds E to the normal matrix N, so that along an eigenvector
 //! of `N^-1 E` with eigenvalue a the estimate is `1 - a` of the motion: where the image has no structure (an
-//! edge's own direction, a grating), a is near 1 and the estimate near zero whatever the motion is. What such
+//! edge's own direction, a grating), a is near 1 and the estimate near zero for every motion. What such
 //! an estimate leaves open is as large as the spread of the one that undoes the attenuation, `1 / (1 - a)`
 //! times as wide.
 
@@ -14,22 +14,22 @@ use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
 use nalgebra::{Matrix6, SymmetricEigen};
 
-/// No direction can hide more than this share of the equations where the shares add up to less.
-const NOTABLE: f64 = 0.5;
-/// Shares nearer to 1 than this cannot be told from 1.
-const WHOLE: f64 = 1e-2;
+/// Noise in no direction exceeds this share of the equations where the shares add up to less.
+const MIN_TOTAL_SHARE: f64 = 0.5;
+/// Floor of `1 - share`: closer to 1, shares are rounding errors.
+const MIN_SIGNAL_SHARE: f64 = 1e-2;
 
 /// Widens the covariances of the first `count` pixels of a row where noise holds a notable share.
-pub(super) fn widen_row<T: SimdReal>(noise: &PixelNoise, scale: f64, pixel: &mut [T], count: usize) {
+pub(super) fn inflate_row<T: SimdReal>(noise: &PixelNoise, scale: f64, pixel: &mut [T], count: usize) {
     for c in 0..count {
         let share = pixel[PIXEL_SHARE * TILE_COLUMNS + c].to_f64();
-        if share > NOTABLE && share.is_finite() {
-            widen(noise, scale, pixel, c);
+        if share > MIN_TOTAL_SHARE && share.is_finite() {
+            inflate(noise, scale, pixel, c);
         }
     }
 }
 
-fn widen<T: SimdReal>(noise: &PixelNoise, scale: f64, pixel: &mut [T], c: usize) {
+fn inflate<T: SimdReal>(noise: &PixelNoise, scale: f64, pixel: &mut [T], c: usize) {
     let at = |k: usize| pixel[k * TILE_COLUMNS + c].to_f64();
     let matrix = |first: usize| Matrix6::from_fn(|i, j| at(first + if i <= j { upper(i, j) } else { upper(j, i) }));
     let ones: [f64; 6] = std::array::from_fn(|k| at(ENTRIES + 8 + k));
@@ -58,7 +58,7 @@ fn widen<T: SimdReal>(noise: &PixelNoise, scale: f64, pixel: &mut [T], c: usize)
 /// covariance holds as a pull: `a^4 / (1 - a)`.
 fn excess(share: f64) -> f64 {
     let a = share.max(0.0);
-    a.min(1.0).powi(4) / (1.0 - a).max(WHOLE)
+    a.min(1.0).powi(4) / (1.0 - a).max(MIN_SIGNAL_SHARE)
 }
 
 #[cfg(test)]

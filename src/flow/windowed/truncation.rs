@@ -1,4 +1,4 @@
-//! What truncation leaves in the equations even without noise.
+//! Truncation errors of the equations, present even without noise.
 //!
 //! The equations hold for quadratic brightness and small steps in time. On texture the stencils see higher
 //! derivatives too, `L_j = sum_ab M_j(a, b) d_x^a d_y^b` with `M_j(a, b) = sum_o L_j(o) o_x^a o_y^b / (a!
