@@ -41,6 +41,7 @@
 mod extended;
 mod kalman;
 pub mod particle;
+mod scalar;
 mod sigma_points;
 mod state;
 #[cfg(test)]
@@ -49,6 +50,7 @@ mod unscented;
 
 pub use extended::ExtendedFilter;
 pub use kalman::KalmanFilter;
+pub(crate) use scalar::update_by_scalar;
 pub use sigma_points::SigmaPoints;
 pub use state::GaussianState;
 #[cfg(feature = "python")]

@@ -19,6 +19,7 @@ mod sample;
 mod smooth;
 #[allow(dead_code)] // as above
 mod spline;
+mod structure_tensor;
 
 pub use border::Border;
 pub use corners::{CORNER_WINDOW, CornerOptions, corner_score, corner_score_into, select_corners};
@@ -37,3 +38,4 @@ pub(crate) use pyramid::{halve_into, halve_mask, halved_noise, halved_size};
 #[allow(unused_imports)] // offered to the estimators that blur product planes
 pub(crate) use smooth::{SeparableKernel, convolve_separable};
 pub(crate) use spline::Spline;
+pub(crate) use structure_tensor::StructureTensor;

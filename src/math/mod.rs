@@ -8,4 +8,6 @@ mod statistics;
 mod ziggurat;
 
 pub use real::Real;
-pub(crate) use statistics::{MAD_TO_STD, central_median, median, nearest_quantile, quantile, robust_std};
+pub(crate) use statistics::{
+    MAD_TO_STD, central_median, geman_mcclure, median, nearest_quantile, quantile, robust_std,
+};

@@ -38,6 +38,13 @@ pub(crate) fn robust_std<T: Real>(absolute_deviations: &mut [T]) -> Option<f64> 
     median(absolute_deviations).map(|median| MAD_TO_STD * median.to_f64())
 }
 
+/// Weight of a residual in robust least squares, `1 / (1 + (residual / scale)^2)^2` (S. Geman and D. McClure,
+/// 1987).
+pub(crate) fn geman_mcclure(residual: f64, scale: f64) -> f64 {
+    let outlying = 1.0 + (residual / scale).powi(2);
+    1.0 / (outlying * outlying)
+}
+
 /// The value at a place of the sorted values.
 fn select<T: Real>(values: &mut [T], place: usize) -> Option<T> {
     let in_order = |a: &T, b: &T| a.to_f64().total_cmp(&b.to_f64());

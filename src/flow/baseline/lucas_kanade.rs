@@ -9,6 +9,7 @@ use super::pair::{Crop, Differences, Gradients, magnitude};
 use crate::error::{Error, Result};
 use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{FieldBand, MaskCounts, bands};
+use crate::image::StructureTensor;
 use crate::jet::Reach;
 use crate::math::Real;
 use crate::parallel::Threads;
@@ -188,8 +189,8 @@ impl LucasKanade {
             return put(band, local, Err(Status::NonFinite), &mut none, f64::NAN);
         }
         let weight = sums.weight;
-        let det = xx * yy - xy * xy;
-        let largest = 0.5 * (xx + yy + ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt());
+        let tensor = StructureTensor { xx, xy, yy };
+        let (det, largest) = (tensor.determinant(), tensor.larger_eigenvalue());
         let spacing = if size_of::<T>() == 4 { f64::from(f32::EPSILON) } else { f64::EPSILON };
         let floor = weight * (brightness * spacing).powi(2) / gain;
         if !(largest > 0.0 && det / largest > floor.max(RANK_TOLERANCE * largest)) {

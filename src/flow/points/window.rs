@@ -2,6 +2,7 @@
 //! frame.
 
 use super::rows::{Block, Rows};
+use crate::image::StructureTensor;
 use crate::simd::Lanes;
 use crate::types::Frame;
 
@@ -25,25 +26,6 @@ pub(super) struct Window {
     copy: Vec<f32>,
     /// 1 in the columns of the window, 0 in the padding.
     inside: Vec<f32>,
-}
-
-/// Mean structure tensor of a window, (grey levels / px)^2: `[xx, xy, yy]`.
-#[derive(Clone, Copy)]
-pub(super) struct Tensor(pub [f64; 3]);
-
-impl Tensor {
-    /// The smaller eigenvalue; NaN where a sample is not finite.
-    pub fn smaller_eigenvalue(self) -> f64 {
-        let [xx, xy, yy] = self.0;
-        0.5 * (xx + yy - ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt())
-    }
-
-    /// The solution of `tensor step = rhs`.
-    pub fn solve(self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let [xx, xy, yy] = self.0;
-        let determinant = xx * yy - xy * xy;
-        [(yy * x - xy * y) / determinant, (xx * y - xy * x) / determinant]
-    }
 }
 
 /// Whole and fractional part of a position, px.
@@ -93,9 +75,9 @@ impl Window {
     }
 
     /// Takes the window around `centre` (x, y) of the first frame: bilinear samples and their central
-    /// differences.
+    /// differences. Returns their mean structure tensor, (grey levels / px)^2.
     #[inline(always)]
-    pub fn take<V: Lanes<Scalar = f32>>(&mut self, frame: &Frame<f32>, centre: [f64; 2]) -> Tensor {
+    pub fn take<V: Lanes<Scalar = f32>>(&mut self, frame: &Frame<f32>, centre: [f64; 2]) -> StructureTensor {
         self.sample_patch::<V>(frame, centre);
         let (zero, half) = (V::zero(), V::constant(0.5));
         let (mut xx, mut xy, mut yy) = (zero, zero, zero);
@@ -118,7 +100,7 @@ impl Window {
             }
         }
         let area = self.area();
-        Tensor([total(xx) / area, total(xy) / area, total(yy) / area])
+        StructureTensor { xx: total(xx) / area, xy: total(xy) / area, yy: total(yy) / area }
     }
 
     /// The samples of the window and of 1 px around it.
@@ -143,7 +125,7 @@ impl Window {
     /// Compares with the window around `centre` of the second frame. Returns the means of slope times
     /// difference along x and y.
     ///
-    /// The difference is first frame minus second frame, so that [`Tensor::solve`] makes it the step to take
+    /// The difference is first frame minus second frame, so that [`StructureTensor::solve`] makes it the step to take
     /// from `centre`.
     #[inline(always)]
     pub fn compare<V: Lanes<Scalar = f32>>(&mut self, frame: &Frame<f32>, centre: [f64; 2]) -> [f64; 2] {

@@ -6,6 +6,7 @@
 //! the frame before, `x' - x'' / (2 alpha)`: that is the second row of H here. With [`Velocity::AsPrinted`]
 //! it is `x'`.
 
+use crate::filter::update_by_scalar;
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
 /// What the measured velocity is taken for.
@@ -114,13 +115,7 @@ impl GaussMarkovFilter {
         let (x, p) = (&mut self.x[axis], &mut self.p[axis]);
         let mut square = 0.0;
         for (h, value, r) in rows.into_iter().flatten() {
-            let innovation = value - (h * *x)[0];
-            let s = (h * *p * h.transpose())[0] + r;
-            let k = *p * h.transpose() / s;
-            *x += k * innovation;
-            let rest = Matrix3::identity() - k * h;
-            *p = rest * *p * rest.transpose() + k * k.transpose() * r;
-            square += innovation * innovation / s;
+            square += update_by_scalar(x, p, &h, (value, r));
         }
         square
     }

@@ -1,6 +1,6 @@
 //! Motion in depth at edge pixels: the disparity at the moved pixels less that at the pixels themselves.
 
-use crate::math::{median, robust_std};
+use crate::math::{geman_mcclure, median, robust_std};
 use crate::types::Frame;
 
 /// Largest distance of the nearest edge pixel, px.
@@ -42,8 +42,7 @@ pub(super) fn robust_mean(values: &mut [f64]) -> Option<f64> {
     for _ in 0..ROUNDS {
         let (mut sum, mut weights) = (0.0, 0.0);
         for value in &*values {
-            let outlying = 1.0 + ((value - mean) / (2.0 * deviation)).powi(2);
-            let weight = 1.0 / (outlying * outlying);
+            let weight = geman_mcclure(value - mean, 2.0 * deviation);
             sum += weight * value;
             weights += weight;
         }

@@ -6,7 +6,7 @@
 use super::cluster_motion::PlaneMotion;
 use super::clusters::Clusters;
 use crate::image::Interpolation;
-use crate::math::{median, robust_std};
+use crate::math::{geman_mcclure, median, robust_std};
 use crate::types::Frame;
 
 /// Grey levels at which two exposures are compared.
@@ -90,10 +90,7 @@ impl Exposure {
         for _ in 0..ROUNDS {
             let off = |[x, y]: &[f64; 2]| y - line.gain * x - line.offset;
             let spread = robust_std(&mut pairs.iter().map(|pair| off(pair).abs()).collect::<Vec<_>>())?;
-            let weight = |pair: &[f64; 2]| {
-                let outlying = 1.0 + (off(pair) / (2.0 * spread.max(MIN_NOISE_STD))).powi(2);
-                1.0 / (outlying * outlying)
-            };
+            let weight = |pair: &[f64; 2]| geman_mcclure(off(pair), 2.0 * spread.max(MIN_NOISE_STD));
             line = weighted_line(&pairs, weight)?;
         }
         Some(line)

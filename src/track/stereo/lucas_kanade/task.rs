@@ -2,7 +2,7 @@
 
 use super::super::cluster_motion::{PlaneMotion, middle};
 use super::{FINE, MAX_RESIDUAL, MAX_VOTERS, MIN_AFFINE_PIXELS, MIN_NOISE_STD, MIN_STEP, PRIOR_STD, SmoothedLevels};
-use crate::math::robust_std;
+use crate::math::{geman_mcclure, robust_std};
 use crate::types::{AffineFlow, Frame};
 use nalgebra::{SMatrix, SVector};
 
@@ -190,8 +190,7 @@ impl<'a> Task<'a> {
             if !residual.is_finite() {
                 continue;
             }
-            let outlying = 1.0 + (f64::from(residual) / (2.0 * deviation)).powi(2);
-            let weight = 1.0 / (outlying * outlying);
+            let weight = geman_mcclure(f64::from(residual), 2.0 * deviation);
             let [gx, gy] = voter.gradient.map(f64::from);
             let (x, y) = (f64::from(voter.x * inverse_radius), f64::from(voter.y * inverse_radius));
             let columns = [gx, gy, x * gx, x * gy, y * gx, y * gy];
