@@ -34,6 +34,7 @@ use super::noise_setting::NoiseSetting;
 use super::sandwich::Sandwich;
 use super::solve::MomentRow;
 use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
+use crate::ablation::keeps;
 use crate::flow::symmetric::ENTRIES;
 use crate::simd::{SimdReal, dispatch};
 use rayon::prelude::*;
@@ -288,7 +289,9 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
         let row = MomentRow { data: &sums.data, first: g * TILE_COLUMNS, stride: GROUP_ROWS * TILE_COLUMNS };
         dispatch(setting.level, Sandwich { setting, row, pixel });
         let (width, count) = (self.columns.len(), (self.columns.end - left).min(TILE_COLUMNS));
-        noise_dominated::inflate_row(&setting.pixel, setting.scale, pixel, count);
+        if keeps("windowed.noise_dominated") {
+            noise_dominated::inflate_row(&setting.pixel, setting.scale, pixel, count);
+        }
         let from = j * width + left - self.columns.start;
         for (k, plane) in self.out.iter_mut().enumerate() {
             let pixel = &self.scratch.pixel;

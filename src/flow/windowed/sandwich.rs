@@ -5,6 +5,7 @@ use super::noise::PixelNoise;
 use super::noise_setting::NoiseSetting;
 use super::solve::{MomentRow, normal_matrix};
 use super::tile::TILE_COLUMNS;
+use crate::ablation::keeps;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::{Kernel, Lanes, SimdReal};
 
@@ -56,13 +57,15 @@ impl<T: SimdReal> Kernel<T> for Sandwich<'_, T> {
             for _ in 0..PULL_STEPS {
                 let truth: [V; 6] = std::array::from_fn(|k| m[k] + shift[k]);
                 let pull = pull::<V>(noise, &ones, &truth);
-                let pull: [V; 6] = std::array::from_fn(|k| pull[k].mul_add(of_noise, misfit[k]));
+                let pull: [V; 6] = std::array::from_fn(|k| {
+                    scaled("windowed.noise_pull", pull[k]).mul_add(of_noise, scaled("windowed.truncation", misfit[k]))
+                });
                 shift = std::array::from_fn(|i| sum(|k| (symmetric(&inverse, i, k), pull[k])));
             }
             let bend: [V; 6] = std::array::from_fn(|i| sum(|k| (symmetric(&inverse, i, k), carried[k])) - m[i]);
             let seen = (0..6).fold(V::zero(), |sum, i| sum + bend[i] * bend[i] / (scatter(i, i) * of_noise));
             let certain = (V::constant(1.0) - V::constant(BEND_CHANCE) / seen).max(V::zero());
-            let certain = certain * V::constant(BEND_WEIGHT);
+            let certain = scaled("windowed.curvature", certain * V::constant(BEND_WEIGHT));
             (share * of_noise).store(&mut pixel[PIXEL_SHARE * TILE_COLUMNS + c..]);
             of_noise.store(&mut pixel[(PIXEL_SHARE + 1) * TILE_COLUMNS + c..]);
             for i in 0..6 {
@@ -81,6 +84,12 @@ impl<T: SimdReal> Kernel<T> for Sandwich<'_, T> {
             c += V::LANES;
         }
     }
+}
+
+/// The value where the heuristic `rule` acts, else zero.
+#[inline(always)]
+fn scaled<V: Lanes>(rule: &str, value: V) -> V {
+    if keeps(rule) { value } else { V::zero() }
 }
 
 /// The variance of the noise, and of all that varies from pixel to pixel: `trace` is tr(N^-1 S), `at` reads
@@ -106,6 +115,13 @@ fn variances<T: SimdReal, V: Lanes<Scalar = T>>(
     let enough = (weight * V::constant(0.5)).lt(known);
     let most = whole * chance;
     let least = V::constant(setting.min_variance);
+    if !keeps("windowed.high_frequencies") {
+        return (whole.max(least), whole.max(least));
+    }
+    if !keeps("windowed.residual") {
+        let only = V::select(enough, fine, whole).max(least);
+        return (only, only);
+    }
     let of_noise = V::select(enough, most.min(fine), whole).max(least);
     (of_noise, V::select(enough, most.min(fine.max(unexplained)), whole).max(least))
 }
