@@ -101,6 +101,16 @@ def test_tables_of_the_readme_are_those_of_the_kept_results():
     assert summary.read_text() == record.markdown() and len(summary.read_text().splitlines()) <= report.SUMMARY_LINES
 
 
+PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "benchmarks").glob("*.md")]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_of_pages_lead_somewhere(page):
+    targets = re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text())
+    missing = [target for target in targets if "://" not in target and not (page.parent / target).exists()]
+    assert not missing
+
+
 def test_defaults_are_the_cores(tmp_path):
     """What the signature promises as a default gives the same as leaving it to the core."""
     frames = list(jacoflow.scenes.Scene("affine", width=32, height=32).frames(3))
