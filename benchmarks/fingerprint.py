@@ -69,12 +69,17 @@ def fields() -> Named:
     disc = jacoflow.scenes.Scene("disc", width=96, height=96).frames(3)
     shifted = np.stack([np.roll(texture(120, 140, 1), 5 * k, 1) for k in range(3)]).astype(np.uint8)
     for preset in ("fast", "balanced", "accurate"):
-        yield f"field {preset} vortex", field_parts(
-            jacoflow.estimate(vortex[:3], method=jacoflow.CoarseToFine(preset=preset), threads=1)
+        yield (
+            f"field {preset} vortex",
+            field_parts(
+                jacoflow.estimate(vortex[:3], method=jacoflow.CoarseToFine(preset=preset), threads=1)
+            ),
         )
         yield (
             f"field {preset} shifted pair",
-            field_parts(jacoflow.estimate(list(shifted[:2]), method=jacoflow.CoarseToFine(preset=preset), threads=1)),
+            field_parts(
+                jacoflow.estimate(list(shifted[:2]), method=jacoflow.CoarseToFine(preset=preset), threads=1)
+            ),
         )
     yield "field balanced float64", field_parts(jacoflow.estimate(disc.astype(float), threads=1))
     for method in ("windowed", "instantaneous", "lucas_kanade", "horn_schunck"):

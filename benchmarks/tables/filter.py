@@ -104,7 +104,11 @@ def agreement(frames: int = 400) -> list[dict[str, object]]:
             measurements, settings, augmented=form == "augmented", motion_first=form == "fast"
         )
         for dtype in ("float64", "float32"):
-            tracker = jacoflow.FlowFilter(profile=jacoflow.FilterProfile(form=form), precision=dtype, grid=jacoflow.SamplingGrid(points=[(32, 32)]))
+            tracker = jacoflow.FlowFilter(
+                profile=jacoflow.FilterProfile(form=form),
+                precision=dtype,
+                grid=jacoflow.SamplingGrid(points=[(32, 32)]),
+            )
             ours = []
             for image in stack:
                 field = tracker.push(image.astype(dtype))

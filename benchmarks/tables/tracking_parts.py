@@ -77,7 +77,9 @@ def gain_rows(reference: Any) -> list[Row]:
     rows: list[Row] = []
     for order, asked in GAINS.items():
         for step, mean in zip(STEPS, asked, strict=True):
-            flow = inner_flow(reference.local_flow(*shifted_texture(step), window=WINDOW, order=order, **UNGATED))
+            flow = inner_flow(
+                reference.local_flow(*shifted_texture(step), window=WINDOW, order=order, **UNGATED)
+            )
             reached = float(np.nanmean(flow[..., 0]))
             rows.append(
                 {
