@@ -30,7 +30,7 @@ const REPLACED: &[(&str, &str)] = &[
         "motion3d",
         "two otherwise alike whole hanging regions gate narrowing coherence rival rivals valley plausible \
          departure special twin signs behind turned displaced intake belief known common together \
-         selected excess widen effort shared turning flow_scale flow_offset estimate_lateral sideways \
+         selected excess widen effort shared turning flow_scale flow_offset estimate_sideways sideways \
          sigma seed",
     ),
     (

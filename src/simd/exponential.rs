@@ -5,9 +5,9 @@ use super::Lanes;
 /// `ln 2` in two parts, the first exact when multiplied by the exponent of a double.
 const LN_2: [f64; 2] = [0.693_147_180_369_123_8, 1.908_214_929_270_587_7e-10];
 /// Below this the result is zero: less than the smallest normal number.
-const LEAST: f64 = -708.0;
+const MIN_EXPONENT: f64 = -708.0;
 /// Above this the result is that of this.
-const MOST: f64 = 709.0;
+const MAX_EXPONENT: f64 = 709.0;
 /// `1 / n!` from n = 13 down.
 const SERIES: [f64; 14] = [
     1.0 / 6_227_020_800.0,
@@ -32,14 +32,14 @@ const SERIES: [f64; 14] = [
 /// `x = n ln 2 + r` with `|r| <= ln 2 / 2` and the series of `e^r`, whose first term left out is 1e-18.
 #[inline(always)]
 pub(crate) fn exp<V: Lanes<Scalar = f64>>(x: V) -> V {
-    let inside = x.max(V::splat(LEAST)).min(V::splat(MOST));
+    let inside = x.max(V::splat(MIN_EXPONENT)).min(V::splat(MAX_EXPONENT));
     let n = inside.mul_add(V::splat(std::f64::consts::LOG2_E), V::splat(0.5)).floor();
     let r = n.neg_mul_add(V::splat(LN_2[1]), n.neg_mul_add(V::splat(LN_2[0]), inside));
     let mut sum = V::splat(SERIES[0]);
     for term in &SERIES[1..] {
         sum = sum.mul_add(r, V::splat(*term));
     }
-    V::select(x.lt(V::splat(LEAST)), V::zero(), sum * n.power_of_two())
+    V::select(x.lt(V::splat(MIN_EXPONENT)), V::zero(), sum * n.power_of_two())
 }
 
 #[cfg(test)]

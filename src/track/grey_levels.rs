@@ -1,16 +1,15 @@
-//! Frames of any sample type on the scale that trackers think in: 8-bit grey levels.
+//! Frames of any sample type on the scale of the trackers' thresholds: 8-bit grey levels.
 
 use crate::types::{AnyFrame, Frame};
 
 /// Brightest value of a float picture whose white is 1, with room for noise and overshoot.
 const UNIT_WHITE: f64 = 1.5;
-/// Less is dark in a picture whose white is 1, and says little of it: black, noise, what a filter left round
-/// something bright.
+/// Threshold of dark samples in a picture whose white is 1: black, noise, the overshoot of a filter.
 const LIT: f64 = 0.1;
 /// Grey levels that no overshoot of a white of 1 reaches.
 const FAR_ABOVE: f64 = 16.0;
-/// Size of samples that are no brightness, grey levels or whatever they are in: such a frame is damaged, and
-/// sums over it lose all that the others say.
+/// Maximum size of a sample that can be a brightness in any unit: above it the frame is damaged, and its sums
+/// lose the other samples to rounding.
 pub const GREATEST: f64 = 1e9;
 /// Shares of the samples that may be hot or damaged: any at all, and those far above white.
 const DAMAGED: [f64; 2] = [1e-3, 1e-2];
@@ -25,8 +24,8 @@ const DAMAGED: [f64; 2] = [1e-3, 1e-2];
 /// be above 16; and where what is above 16 is a hundredth of the frame and most of what exceeds 1.5, dim
 /// surroundings do not matter. So patches of hot pixels decide nothing.
 ///
-/// A film may begin with black, which says nothing: the first frame of grey levels after it sets that right
-/// ([`revised`](Self::revised)). The other way there is none: brightness must not jump.
+/// A sequence may begin with black frames, which do not decide: the first later frame of grey levels does
+/// ([`revised`](Self::revised)). The reverse is excluded: brightness must not jump.
 ///
 /// A camera of 10 to 14 bit whose samples are not shifted up in their 16 bits comes out dark; it is to be
 /// scaled beforehand.
@@ -145,7 +144,7 @@ mod tests {
             let inside = |x: usize, y: usize| x < side && y < side;
             assert_eq!(beside(|x, y| if inside(x, y) { hot } else { 0.2 + 0.002 * x as f64 }), 127.5, "{side} {hot}");
         }
-        // On black a small patch decides if it is far above white: a small thing rather than a hot one.
+        // On black a small patch decides if it is far above white: a small object rather than hot pixels.
         let inside = |x: usize, y: usize| x < 9 && y < 9;
         assert_eq!(beside(|x, y| if inside(x, y) { 1.6 } else { 0.0 }), 127.5);
         assert_eq!(beside(|x, y| if inside(x, y) { 160.0 } else { 0.0 }), 0.5);
@@ -156,7 +155,7 @@ mod tests {
     #[test]
     fn grey_levels_are_known_in_the_dark_too() {
         let away = |x: usize, y: usize| ((x as f64 - 160.0).powi(2) + (y as f64 - 120.0).powi(2)) / 50.0;
-        // A smooth spot on black, something small before what is dim, and a picture without anything bright.
+        // A smooth spot on black, a small bright object before a dim background, and a dim picture.
         assert_eq!(beside(|x, y| 200.0 * (-away(x, y)).exp()), 0.5);
         assert_eq!(beside(|x, y| if away(x, y) < 9.0 { 180.0 } else { 0.7 }), 0.5);
         assert_eq!(beside(|x, _| 1.0 + 0.02 * x as f64), 0.5);

@@ -9,12 +9,16 @@ use std::path::{Path, PathBuf};
 pub(super) const KIND: Kind = Kind {
     name: "files",
     accepts: |spec| {
-        Path::new(spec).is_dir()
-            || (has_extension(spec, EXTENSIONS) && (Path::new(spec).exists() || !super::glob::is_pattern(spec)))
+        Path::new(spec).is_dir() || (has_extension(spec, EXTENSIONS) && (Path::new(spec).exists() || !is_pattern(spec)))
     },
     open: open_files,
     open_colour: open_files,
 };
+
+/// Whether the text has a pattern's special characters.
+pub(super) fn is_pattern(spec: &str) -> bool {
+    spec.contains(['*', '?', '['])
+}
 
 fn open_files<P: ChannelPolicy>(spec: &str, policy: P) -> Result<Box<dyn FrameSource<P::Frame>>> {
     let path = Path::new(spec);

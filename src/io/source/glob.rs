@@ -1,6 +1,6 @@
 //! Image files that match a pattern.
 
-use super::files::sort_naturally;
+use super::files::{is_pattern, sort_naturally};
 use super::{FilesSource, Kind, has_extension};
 use crate::error::{Error, Result};
 use crate::io::decode::EXTENSIONS;
@@ -12,11 +12,6 @@ pub(super) const KIND: Kind = Kind {
     open: |spec, policy| Ok(Box::new(FilesSource::new(matches(spec)?, policy)?)),
     open_colour: |spec, policy| Ok(Box::new(FilesSource::new(matches(spec)?, policy)?)),
 };
-
-/// Whether the text has a pattern's special characters.
-pub(super) fn is_pattern(spec: &str) -> bool {
-    spec.contains(['*', '?', '['])
-}
 
 /// The image files that match, in natural order.
 fn matches(pattern: &str) -> Result<Vec<PathBuf>> {
