@@ -51,7 +51,7 @@ impl PyGradientTracker {
     }
 }
 
-/// What moves of a field (H, W, 2), of `jacoflow.reference.mean_flow`: velocity, centroid and how many pixels.
+/// What moves of a field (H, W, 2), of `jacoflow.reference.mean_flow`: velocity, centroid and count.
 #[pyfunction(name = "_mean_flow")]
 pub fn mean_flow(
     flow: PyReadonlyArray3<'_, f64>,

@@ -1,4 +1,4 @@
-//! The first thing that moves: its box from two frames, where nobody gave one.
+//! The first object that moves: its box from two frames, where nobody gave one.
 
 use super::noise::noise_of;
 use crate::types::{Frame, TargetBox};
@@ -44,7 +44,7 @@ pub struct MovingTarget {
     pub displacement: [f64; 2],
 }
 
-/// Finds what moves between two frames of a still scene: the largest thing, or that nearest to a point.
+/// Finds what moves between two frames of a still scene: the largest object, or that nearest to a point.
 ///
 /// Changed pixels differ by three deviations of the noise and have changed neighbours. The displacement
 /// within 10 px along each axis is the smallest that explains them nearly best, as what came or as what went;
@@ -62,7 +62,7 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
     let object = objects.swap_remove(chosen);
     let between = half_a_pixel_around(first);
     let explain = |object: &[(usize, usize)]| displacement(&between, second, object, noise);
-    // What an even target uncovers and what it covers lie apart, as far as it is long: together they are
+    // What an even target uncovers and what it covers lie apart by its length: together they are
     // explained without a rest.
     let whole = objects
         .iter()

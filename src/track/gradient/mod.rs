@@ -5,8 +5,8 @@
 //! background, a Gauss-Markov filter), but the equation is solved once for the pose of the whole segmented
 //! target. Their own loop is in `reference`, behind the feature of that name.
 //!
-//! A target starts with a box, or with what moves first (`start`, `detect`); then each frame passes the stages
-//! of `layered`, which filters the position by `gauss_markov`.
+//! A target starts with a box, or with what moves first (`start`, `detect`); then each frame passes the
+//! stages of `layered`, which filters the position by `gauss_markov`.
 
 mod detect;
 mod gauss_markov;

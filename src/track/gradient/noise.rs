@@ -3,7 +3,7 @@
 use crate::math::robust_std;
 use crate::types::Frame;
 
-/// Pixels that the noise is told from, about.
+/// Pixels that the noise is measured on, about.
 const NOISE_SAMPLES: usize = 2048;
 
 /// Noise of the frames from their difference: `1.4826 median|E(t+1) - E(t)| / sqrt 2`, grey levels; 0 where

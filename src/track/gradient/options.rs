@@ -2,7 +2,7 @@
 
 use crate::types::TargetBox;
 
-/// What the target's image does besides moving.
+/// Changes of the target's image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Shape {
     /// It rotates and grows: four unknowns. The default.

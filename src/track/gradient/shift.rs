@@ -22,7 +22,7 @@ pub(super) fn shifted_into(mut memory: Vec<f64>, frame: &Frame<f64>, shift: [f64
     memory
 }
 
-/// Rows are read along x once each, as they are needed, and their sum along y goes to the rows that are told.
+/// Rows are read along x once each, as they are needed, and their sum along y goes to the output.
 struct Shift<'a> {
     frame: &'a Frame<f64>,
     taps: [Taps; 2],

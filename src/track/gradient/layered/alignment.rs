@@ -23,7 +23,7 @@ pub(super) struct Alignment {
     pub pose: Pose,
     /// Covariance of the position in the picture, px^2.
     pub covariance: [[f64; 2]; 2],
-    /// How much of the rotation was told by the picture, 0 to 1; `None` where it was not asked.
+    /// How much of the rotation the picture determines, 0 to 1; `None` where it was not estimated.
     pub rotation_observable: Option<f64>,
     /// Brightness over that of the template.
     pub gain: f64,

@@ -13,14 +13,14 @@ use crate::types::Frame;
 const JUMPED: f64 = 100.0;
 /// Frames after a look-alike touched for which it is reckoned with.
 const WARY: usize = 8;
-/// Least information about the rotation, of all there could be, from which on it is told; else the angle is
+/// Minimum share of the possible information about the rotation for it to be reported; else the angle is
 /// held. Round targets are known by their outline: this bounds what errors of that may turn.
 const TOLD: f64 = 0.75;
 /// Least deviation of a measured position, px.
 const LEAST_DEVIATION: f64 = 0.05;
 /// Frames after an interruption in which what is not seen of the target may be hidden still.
 const RETURNING: usize = 3;
-/// How far a target must have gone while it is young, over its shorter side, for what its box holds besides
+/// How far a target must have gone while it is young, over its shorter side, for what else its box holds
 /// to have stayed behind; slower ones wait for that in vain.
 const FAR: f64 = 0.4;
 /// Rate of the mean visibility.
@@ -65,7 +65,7 @@ pub(super) fn apply_measurement(state: &mut State, found: &Finding, frame: &Fram
         && found.nis > JUMPED
         && crate::ablation::keeps("gradient.restart_filter")
     {
-        // Nobody moves like that: it is begun anew where it was found.
+        // Nobody moves like that: it is begun again where it was found.
         state.motion.filter = start_filter(at);
     }
     if occluded && !state.history.occluded && crate::ablation::keeps("gradient.damped") {

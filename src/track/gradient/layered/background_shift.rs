@@ -5,7 +5,7 @@ use crate::track::gradient::shift::shifted_into;
 use crate::types::Frame;
 use std::ops::Range;
 
-/// Pixels along an axis of a picture that was shifted, as far as they come from pixels.
+/// Pixels along an axis of a picture that was shifted, where they come from pixels.
 struct Sources {
     to: Range<usize>,
     /// How much farther on the nearest pixel is that each comes from.

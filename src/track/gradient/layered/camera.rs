@@ -17,7 +17,7 @@ const FACTORS: [usize; 3] = [4, 2, 1];
 const SIGMA: f64 = 1.0;
 /// Shortest motion that is believed, px.
 const LEAST_MOTION: f64 = 0.05;
-/// A frame and its reductions, made when they are first asked for: the next frame needs them again.
+/// A frame and its reductions, made when they are first needed: the next frame needs them again.
 #[derive(Debug, Default)]
 pub(super) struct FramePyramid {
     pub frame: Frame<f64>,
@@ -74,7 +74,7 @@ fn scene_motion(
         let found = samples.refine(next, motion.map(reduced), noise);
         let finest = factor == 1;
         let believed = |m: [f64; 2]| m[0].hypot(m[1]) > LEAST_MOTION / f && samples.explain(next, m);
-        // Most cameras stand still: the coarsest pictures, which have the least noise, tell it already.
+        // Most cameras stand still: the coarsest pictures, which have the least noise, decide it already.
         let asked = finest || factor == FACTORS[0] && !swinging;
         match found.filter(|m| !asked || believed(*m)) {
             Some(found) => motion = found.map(|m| m * f),

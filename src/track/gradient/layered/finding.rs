@@ -19,7 +19,7 @@ pub(super) const LEAST: [f64; 2] = [0.35, 0.5];
 pub(super) const DOUBT: f64 = 12.0;
 /// Frames in which the support is still adapting to what the box holds.
 pub(super) const YOUNG: usize = 6;
-/// What is said of a target that something hides in part.
+/// What is said of a target that an object hides in part.
 pub(super) const COVERED: &str = "something covers the target";
 /// Part of the target's area that may look like it beside it.
 pub(super) const LEAK: f64 = 0.06;

@@ -1,5 +1,5 @@
-//! What the first box held besides the target: something still before it. In the first frames that move, what
-//! moves is told from what does not.
+//! What the first box held in addition to the target: an object at rest in front of it. In the first frames
+//! that move, what moves is separated from what does not.
 //!
 //! A box that holds half a target and half of what hides it makes a template of both, and the still edge
 //! between them holds the target back. The first frame is therefore kept for a while, and that displacement
@@ -42,7 +42,7 @@ pub(super) struct InitialSegmentation {
     pub inside: Frame<bool>,
     frames: usize,
     moved: [isize; 2],
-    /// Frames at which that was told.
+    /// Frames at which that was found.
     told: usize,
 }
 
@@ -88,7 +88,7 @@ impl InitialSegmentation {
         self.frames
     }
 
-    /// How far all that moved did since the first frame, px; `None` where the last frame does not tell it.
+    /// Displacement of all that moved since the first frame, px; `None` if the last frame does not determine it.
     pub fn moved(&self) -> Option<[f64; 2]> {
         (self.told == self.frames && self.frames > 0).then(|| self.moved.map(|moved| moved as f64))
     }

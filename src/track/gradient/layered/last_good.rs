@@ -1,4 +1,4 @@
-//! A target that vanishes soon after it was seen less or became smaller: something had begun to cover it, and
+//! A target that vanishes soon after it was seen less or became smaller: an object had begun to cover it, and
 //! what was measured meanwhile was the rest of it.
 //!
 //! The edge of what covers a target stands for the target's own; a similarity that follows it shrinks and
@@ -11,7 +11,7 @@ use crate::types::TargetBox;
 
 /// Frames after which the state from before is too old to go on from.
 const LATELY: usize = 6;
-/// Part of the acceleration that is kept, as where something known covers the target.
+/// Part of the acceleration that is kept, as where a known surface covers the target.
 pub(super) const DAMPED: f64 = 0.3;
 
 /// After a measurement: keeps the state if the target was seen whole; `smaller`: it shrank by what cover

@@ -169,7 +169,7 @@ impl Background {
         this
     }
 
-    /// Pixels in and around a box that are neither known nor `told` get a smooth continuation of those that
+    /// Pixels in and around a box that are neither known nor given get a smooth continuation of those that
     /// are.
     pub fn guess(&mut self, hidden: &TargetBox, told: impl Fn(usize, usize) -> bool) {
         let reach = [hidden.width, hidden.height].map(|side| 0.5 * side + AROUND);

@@ -16,7 +16,7 @@ const NODES: f64 = 2048.0;
 const GAIN: (f64, f64) = (0.8, 1.25);
 /// Support that the brightness ratio is measured on.
 const BRIGHT: f64 = 0.7;
-/// Support from which on a point must be the target, unless something covers it.
+/// Support from which on a point must be the target, unless it is occluded.
 const SOLID: f64 = 0.3;
 
 /// A node that may vote.
@@ -78,7 +78,7 @@ impl<'a> Level<'a> {
         self.behind.read(places, behind);
     }
 
-    /// Votes of the nodes, without the weights for outliers; tells the range of the model among them.
+    /// Votes of the nodes, without the weights for outliers; returns the range of the model among them.
     pub fn vote(&mut self, pose: &Pose, gain: f64, silent: Option<&Frame<bool>>) -> f64 {
         self.read(pose);
         self.votes.clear();

@@ -5,7 +5,7 @@ use super::samples::{AROUND, CAP, LESS, spread};
 use crate::track::gradient::noise::median;
 use crate::types::{Frame, TargetBox};
 
-/// Pixels that the light is told from, at most.
+/// Pixels that the light is measured on, at most.
 const LIGHT_SAMPLES: usize = 1024;
 /// Brightness ratios nearer to 1 are none.
 const LEAST_LIGHT: f64 = 0.01;

@@ -85,7 +85,7 @@ pub(super) fn is_remainder(state: &State, found: &Finding) -> bool {
     !found.occluded && found.score.visibility < WELL && (state.history.occluded && off || was_hidden && shrunk)
 }
 
-/// Whether something that looks like the target touches it: much of it beside the target, on one side. A
+/// Whether an object that looks like the target touches it: much of it beside the target, on one side. A
 /// moment after that was so, what pulls the target out of its way or makes it grow is still the
 /// look-alike. That ends by itself: size and way of the target are not followed meanwhile, and would
 /// differ the more the longer it lasts.
@@ -100,7 +100,7 @@ pub(super) fn look_alike_reason(state: &State, found: &Finding) -> Option<&'stat
         .then_some(TOUCHED_BEFORE)
 }
 
-/// Something that looks like the target touches it.
+/// A similar object touches it.
 pub(super) fn locate_beside_look_alike(
     state: &State,
     frame: &Frame<f64>,

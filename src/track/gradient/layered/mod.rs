@@ -1,17 +1,17 @@
 //! The layered tracker: the target and what is behind it as two layers, and one gradient step over the whole
 //! target from the filter's prediction.
 //!
-//! `state` holds everything that is known of the target; its parts are `pose`, `patch`, `layers` and `initial`.
+//! `state` holds all that is known of the target; its parts are `pose`, `patch`, `layers` and `initial`.
 //! A frame passes these stages:
 //!
-//! 1. `scene`: is the frame usable, in which `light`, and how did the `camera` move (`samples`, `nearby`)? The
-//!    background is shifted with it (`background_shift`).
+//! 1. `scene`: is the frame usable, in which `light`, and how did the `camera` move (`samples`, `nearby`)?
+//!    The background is shifted with it (`background_shift`).
 //! 2. `restart`: in the first frames, the initial segmentation: does the box hold an `occluder`, or another
 //!    box than that of what moves (`refit`, `outgrown`)?
 //! 3. `locate`: the target, by alignment (`task`, `level`, `alignment`) and a `score` (`finding`), with
 //!    `occlusion`, a `search` all around, a changed outline (`reshaped`) or size (`resized`).
-//! 4. `apply`: the measurement goes to the filter, and the layers `learn` from the frame. A target that vanishes
-//!    goes on from its `last_good` state.
+//! 4. `apply`: the measurement goes to the filter, and the layers `learn` from the frame. A target that
+//!    vanishes goes on from its `last_good` state.
 //! 5. `report`: status, box and covariance.
 
 mod alignment;

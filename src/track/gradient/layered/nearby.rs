@@ -9,7 +9,7 @@ use crate::types::{Frame, TargetBox};
 
 /// Farthest from the target, px.
 const NEAR: f64 = 48.0;
-/// Pixels that it is told from, about.
+/// Pixels that it is measured on, about.
 const SAMPLES: usize = 1024;
 /// Fewest of them.
 const FEWEST: usize = 256;

@@ -1,4 +1,4 @@
-//! Which pixels of the first box are the target's, and which are of something still before it.
+//! Which pixels of the first box are the target's, and which are of an object at rest in front of it.
 
 use super::initial::{Changes, InitialSegmentation};
 use super::patch::smooth_known;
@@ -27,14 +27,14 @@ const HIDDEN: [f64; 2] = [0.05, 0.9];
 const APART: f64 = 0.3;
 /// Share of either part that may not do as it should.
 const STRAY: f64 = 0.02;
-/// Around the box, what is behind the target is told from, px.
+/// Around the box, what is behind the target is measured on, px.
 const AROUND: usize = 3;
-/// Displacement, px squared, beyond which what moves is told from what does not.
+/// Displacement, px squared, beyond which what moves is separated from what does not.
 const LEAST: isize = 2;
 /// Longest way between pixels, as one counts that differ only by noise.
 const FAR: f64 = 1e6;
 
-/// Part of the first box is something still before the target.
+/// Part of the first box is an object at rest in front of the target.
 #[derive(Debug)]
 pub(super) struct HiddenPart {
     /// How far the target moved since the first frame, px.
@@ -56,7 +56,7 @@ pub(super) fn find_occluder(initial: &mut InitialSegmentation, frame: &Frame<f64
     hidden.map(|hidden| HiddenPart { moved: moved.map(|m| m as f64), frames: initial.frames(), hidden })
 }
 
-/// Pixels of the box that something still hides the target at; `None` without evidence for such a thing.
+/// Pixels of the box at which an object at rest hides the target; `None` without evidence for that.
 ///
 /// Wherever the target slides along a still edge, what was there in the first frame is neither followed by it
 /// nor changed. What is on the target's side of that edge looks like what is known to move, on the other side
@@ -125,7 +125,7 @@ impl Parts {
     }
 }
 
-/// What a displacement tells of single pixels.
+/// What a displacement shows of single pixels.
 struct Evidence {
     /// Pixels of the first box that were followed by the displacement, and not by rest.
     moving: Vec<[usize; 2]>,
@@ -277,7 +277,7 @@ mod tests {
         })
     }
 
-    /// What is told when the square has moved once.
+    /// What is found when the square has moved once.
     fn told(bounds: TargetBox, moved: [usize; 2], hidden_to: usize) -> Option<HiddenPart> {
         let first = scene([0; 2], hidden_to, 1);
         let mut outset = InitialSegmentation::new(&first, bounds, Target::new(&first, bounds, 144.0));
@@ -303,7 +303,7 @@ mod tests {
         assert!(told(exact(), [4, 1], 0).is_none());
         assert!(told(TargetBox { x: 35.5, y: 25.5, width: 28.0, height: 28.0 }, [4, 1], 0).is_none());
         assert!(told(TargetBox { x: 43.5, y: 33.5, width: 12.0, height: 12.0 }, [4, 1], 0).is_none());
-        // What does not move tells nothing.
+        // What does not move shows nothing.
         assert!(told(exact(), [0, 0], 50).is_none());
     }
 

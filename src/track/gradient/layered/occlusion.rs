@@ -1,4 +1,4 @@
-//! Targets that something known covers in part, or begins to cover.
+//! Targets that a known surface covers in part, or begins to cover.
 
 use super::finding::{COVERED, DOUBT, DROP, Finding, LEAK, LEVELS, PRIOR, YOUNG, try_at};
 use super::score::Score;
@@ -16,7 +16,7 @@ pub(super) const STRIP: f64 = 1.25;
 /// Distance of two poses that a covered edge makes, px.
 pub(super) const HELD_BACK: f64 = 0.5;
 
-/// Something known covers the target: only its position is looked for, where it is not covered.
+/// A known surface covers the target: only its position is looked for, where it is not covered.
 pub(super) fn locate_occluded(
     state: &State,
     frame: &Frame<f64>,
@@ -41,7 +41,7 @@ pub(super) fn locate_occluded(
     taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
 }
 
-/// Something known begins to cover a large target, and its edge stands for the target's own: what is on
+/// A known surface begins to cover a large target, and its edge stands for the target's own: what is on
 /// the side towards which the target is off has no vote.
 pub(super) fn locate_entering_occlusion(state: &State, frame: &Frame<f64>, plain: &Finding) -> Option<Finding> {
     let (at, expected) = (state.position(&plain.aligned.pose), state.motion.filter.position());
@@ -53,7 +53,7 @@ pub(super) fn locate_entering_occlusion(state: &State, frame: &Frame<f64>, plain
 }
 
 /// Whether what is not seen of it may be covered. While the support is still adapting to the box that is
-/// not told, but of a large target that was seen whole: of a small one a wrong box leaves as much unseen
+/// not known, but of a large target that was seen whole: of a small one a wrong box leaves as much unseen
 /// as cover.
 pub(super) fn is_settled(state: &State) -> bool {
     state.history.age >= YOUNG && !state.is_adapting()

@@ -1,7 +1,7 @@
 //! A first box that is too large, too wide or beside the target: what moves has another outline.
 //!
 //! In the first frames that move, what moves is looked for without the box ([`detect_moving_target`]). Where
-//! it has clearly other sides than the box, what the box holds besides stayed where it was and does not look
+//! it has clearly other sides than the box, what else the box holds stayed where it was and does not look
 //! like the target, and what the box leaves out moved along, it is the target.
 
 use super::initial::{Changes, InitialSegmentation};
@@ -13,22 +13,22 @@ use crate::types::{Frame, TargetBox};
 const SOON: usize = 8;
 /// Least and greatest displacement along the axis it is greater on, px.
 const MOVED: [f64; 2] = [2.0, 7.0];
-/// The same as what the box holds tells it, which its other content may blur.
+/// The same as measured on what the box holds, which its other content may blur.
 const NEARLY: [f64; 2] = [1.0, 8.0];
-/// How far the middles must be apart: share of the box's side, and px. What moves is told in whole pixels,
+/// How far the middles must be apart: share of the box's side, and px. What moves is known in whole pixels,
 /// and its extent is up to 2 px too long, on either end: its middle is off by 1 px at most.
 const APART: (f64, f64) = (0.1, 1.3);
 /// The same of the sides' difference.
 const LONGER: (f64, f64) = (0.15, 2.5);
 /// How far what moves may go beyond a box that holds all of it, px.
 const BEYOND: f64 = 1.5;
-/// Angle, rad, from which on changes since the first frame no longer tell the outline.
+/// Angle, rad, from which on changes since the first frame no longer determine the outline.
 pub(super) const TURNED: f64 = 0.05;
 /// Sides of what moves over those of the box, at least and at most.
 const SIDES: [f64; 2] = [0.55, 1.6];
 /// Distance of the middles of the two, share of the box's sides.
 const ASIDE: f64 = 0.4;
-/// The same, and px, where the box holds all of what moves: of a target that something hides in part the box
+/// The same, and px, where the box holds all of what moves: of a target that an object hides in part the box
 /// holds the hidden part, on one side.
 const CENTRED: (f64, f64) = (0.08, 0.75);
 /// Width of the rim around what moved in which it must stand out, px.
@@ -45,7 +45,7 @@ const USUAL: [f64; 2] = [0.1, 0.9];
 impl InitialSegmentation {
     /// What moved, where that has clearly other sides than the box.
     pub fn refitted(&self, frame: &Frame<f64>, noise: f64) -> Option<MovingTarget> {
-        // Where what the box holds tells its displacement, that spares looking in vain.
+        // Where what the box holds determines its displacement, that spares looking in vain.
         let promising = self.moved().is_none_or(|moved| (NEARLY[0]..=NEARLY[1]).contains(&greater(moved)));
         if self.frames() > SOON || !promising {
             return None;
@@ -156,7 +156,7 @@ mod tests {
     const SIDE: usize = 14;
     const NOISE: f64 = 1.5;
 
-    /// A square that was at (40, 30) at first, `moved` since, with something still beside it up to a column,
+    /// A square that was at (40, 30) at first, `moved` since, beside an object at rest up to a column,
     /// before texture.
     fn scene(moved: [usize; 2], hidden_to: usize, level: f64, seed: u64) -> Frame<f64> {
         let rng = CounterRng::new(seed);

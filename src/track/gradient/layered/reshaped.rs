@@ -11,12 +11,12 @@ use super::state::State;
 use super::task::{MotionModel, VoteMask};
 use crate::types::Frame;
 
-/// Part of the target's area in which its support is not what the picture tells, from which on its outline is
+/// Part of the target's area in which its support is not what the picture shows, from which on its outline is
 /// doubted.
 const OFF: f64 = 0.2;
 /// Part of the target's area beside it that looks like it, from which on it is taken for the target's own.
 const BEYOND: f64 = 0.03;
-/// How far that lies on one side, from which on it may be something else, and the map must be where the
+/// How far that lies on one side, from which on it may be another object, and the map must be where the
 /// target is expected.
 const ASIDE: f64 = 0.5;
 /// What an affine map may leave of the area that is not explained, share.
@@ -35,7 +35,7 @@ pub(super) fn locate_reshaped(state: &State, frame: &Frame<f64>, plain: &Finding
     }
     let guess = state.expected();
     let mut found = try_at(state, frame, &guess, (MotionModel::Affine, VoteMask::None, PRIOR, levels))?;
-    // Which way a stretched outline is turned is told by the similarity, if at all.
+    // Which way a stretched outline is turned is determined by the similarity, if at all.
     found.aligned.rotation_observable = plain.aligned.rotation_observable;
     let farthest = if plain.score.one_sided < ASIDE { DOUBT } else { SURE };
     let expected = found.nis < farthest && found.aligned.pose.scale() > SHRUNK * state.motion.pose.scale();

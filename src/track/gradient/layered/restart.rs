@@ -1,4 +1,4 @@
-//! Beginning anew where something still hid part of the target in the first frame: that part is the target's
+//! Starts again where an object at rest hid part of the target in the first frame: that part is the target's
 //! all the same, but is not known yet, and what hides it is known.
 
 use super::finding::YOUNG;
@@ -13,16 +13,16 @@ use super::state::{ADAPTED, State, start_filter};
 use crate::track::gradient::detect::MovingTarget;
 use crate::types::{Frame, TargetBox};
 
-/// Variance of the displacement since the first frame, which is told in whole pixels, px^2.
+/// Variance of the displacement since the first frame, which is in whole pixels, px^2.
 const WHOLE_PIXELS: f64 = 0.5;
 /// Difference of displacements that whole pixels, and what is behind the target, may make, px.
 const WHOLE: f64 = 2.0;
-/// Deviation of the middle of what moved, whose sides are told to a pixel, px.
+/// Deviation of the middle of what moved, whose sides are known to a pixel, px.
 const UNSETTLED: f64 = 0.6;
 /// Change in still places that noise does not make, over the noise.
 const STILL: f64 = 4.0;
 
-/// Looks whether the frame tells what the first box held.
+/// Looks whether the frame decides what the first box held.
 pub(super) fn resolve_initial(state: &mut State, frame: &Frame<f64>, motion: [f64; 2]) {
     let Some(mut outset) = state.initial.take().filter(|_| motion == [0.0; 2]) else { return };
     match find_occluder(&mut outset, frame, state.scene.noise) {
@@ -91,13 +91,13 @@ pub(super) fn restart_at(state: &mut State, centre: [f64; 2], moved: [f64; 2], f
     (state.last_good, state.history.adapts_until) = (None, ADAPTED);
 }
 
-/// As long as the first box is not told from what it held besides, what is said of the way since then may
+/// As long as the first box is undecided, what is reported of the way since then may
 /// be wrong by as much as the displacement of all that moved differs from it.
 pub(super) fn update_displacement_uncertainty(state: &mut State) {
     let told = state.initial.as_ref().and_then(|outset| outset.moved().map(|moved| (moved, outset.bounds.centre())));
     let Some((moved, first)) = told else { return state.uncertainty.displacement = [0.0; 2] };
     let (at, size) = (state.motion.filter.position(), state.target.size);
-    // The sides of what grows move otherwise than its middle.
+    // The sides of what grows move differently from its middle.
     let grown = (state.motion.pose.scale() - 1.0).abs();
     state.uncertainty.displacement = [0, 1].map(|k| {
         let apart = (at[k] - first[k] - moved[k]).abs();

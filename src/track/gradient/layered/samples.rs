@@ -11,7 +11,7 @@ const STEPS: usize = 8;
 const SETTLED: f64 = 0.005;
 /// By how much the capped residual must fall.
 pub(super) const LESS: f64 = 0.9;
-/// Every which of them the deviation of the residuals is told from.
+/// Every which of them the deviation of the residuals is measured on.
 const EVERY: usize = 4;
 /// Residual that all larger ones count as, grey levels.
 pub(super) const CAP: f64 = 25.0;
@@ -21,7 +21,7 @@ const LEAST_INFORMATION: f64 = 0.05;
 pub(super) const AROUND: f64 = 14.0;
 /// Motions nearer to each other than this lead to the same, px.
 pub(super) const SAME: f64 = 0.5;
-/// Pixels that the scatter is told from, at most.
+/// Pixels that the scatter is measured on, at most.
 pub(super) const SCATTER_SAMPLES: usize = 1024;
 /// Pixels used at a level, at most.
 const MAX_SAMPLES: usize = 4096;
@@ -35,7 +35,7 @@ pub(super) fn spread(size: (usize, usize), hidden: TargetBox, most: usize) -> im
     })
 }
 
-/// Pixels of a frame that its motion is told from.
+/// Pixels of a frame that its motion is measured on.
 pub(super) struct Samples {
     places: Vec<(usize, usize)>,
     values: Vec<f64>,

@@ -38,7 +38,7 @@ pub(super) fn is_blank(state: &State, frame: &Frame<f64>) -> bool {
     now < GONE * before && before > LEAST_NOISE && state.scene.gap <= WILD_FOR
 }
 
-/// How far the scene moved since the last frame that said something.
+/// How far the scene moved since the last frame that could be used.
 pub(super) fn measure_camera_motion(state: &State, seen: &FramePyramid, bounds: TargetBox) -> [f64; 2] {
     let expected = state.scene.camera_velocity.map(|m| m * state.scene.gap as f64);
     match state.camera {

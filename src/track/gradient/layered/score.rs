@@ -31,7 +31,7 @@ pub(super) struct Score {
     pub leak: f64,
     /// How far those lie on one side, 0 to 1.
     pub one_sided: f64,
-    /// Area in which the support is not the one that the picture alone tells, px of the target squared.
+    /// Area in which the support is not the one that the picture alone determines, px of the target squared.
     pub mismatch: f64,
 }
 
@@ -61,9 +61,9 @@ pub(super) fn is_hit(seen: f64, bright: f64, behind: f64, noise: f64) -> bool {
     nearer && off < 4.0 * noise + 0.15 * contrast + 6.0
 }
 
-/// By how much the support at a point differs from the one that its brightness alone tells: the share of the
-/// target in a mixture with what is behind. Unlike hits, which are whole points, this tells fractions of a
-/// pixel at an edge. Points where the layers are too alike to tell are left out.
+/// By how much the support at a point differs from the one by its brightness alone: the share of the
+/// target in a mixture with what is behind. Unlike hits, which are whole points, this measures fractions of a
+/// pixel at an edge. Points where the layers are too alike to decide are left out.
 fn mismatch(a: f64, seen: f64, bright: f64, behind: f64, noise: f64) -> f64 {
     let contrast = bright - behind;
     if contrast.abs() > 4.0 * noise && !seen.is_nan() {

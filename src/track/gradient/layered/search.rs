@@ -83,7 +83,7 @@ fn cost(
     Some(own / count as f64 - LIKE_BEHIND * if known > 0 { behind / known as f64 } else { 0.0 })
 }
 
-/// Brightness at the nearest pixel, or between pixels where that is as far as it gets.
+/// Brightness at the nearest pixel, or between pixels at the border.
 #[inline(always)]
 fn nearest(frame: &Frame<f64>, [x, y]: [f64; 2]) -> f64 {
     let (i, j) = ((x + 0.5) as usize, (y + 0.5) as usize);

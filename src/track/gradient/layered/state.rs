@@ -18,7 +18,7 @@ const OUTLINE: f64 = 0.07;
 /// What noise adds to the deviation of the middle, over noise by contrast, px: what is learnt of an edge from
 /// noisy frames stays wrong for as long as it is remembered.
 const OUTLINE_IN_NOISE: f64 = 1.4;
-/// Frames after which it is done with that, whatever is seen.
+/// Frames after which it is done with that, in any case.
 pub(super) const ADAPTED: usize = 20;
 /// Change of size from one frame to the next that a look-alike makes, or cover.
 pub(super) const GROWN: f64 = 0.04;
@@ -86,7 +86,7 @@ pub(super) struct History {
     /// Frames in a row without a measurement.
     pub missed: usize,
     pub occluded: bool,
-    /// Frames in a row in which something covered it.
+    /// Frames in a row in which an object covered it.
     pub occluded_frames: usize,
     /// Frames in which the target may still not have come out entirely.
     pub reappearing: usize,

@@ -1,4 +1,4 @@
-//! What an alignment is asked: layers, what may change, and which points have no vote.
+//! What an alignment is given: layers, what may change, and which points have no vote.
 
 use super::layers::{Background, Target};
 use super::pose::Increment;

@@ -136,7 +136,7 @@ mod tests {
     fn the_end_that_is_seen_tells_where_the_target_is() {
         let extent = Extent::new([20.0, 20.0]);
         let ends = [[40.0, 50.0], [10.0, 30.0]];
-        // Half of it is beyond the right border, then beyond the left one, then behind something in the
+        // Half of it is beyond the right border, then beyond the left one, then behind an object in the
         // picture.
         let at = |expected: f64, length: f64| extent.middle(&ends, [expected, 20.0], [length, 80.0])[0].unwrap();
         assert_eq!((at(51.0, 54.0).at, at(51.0, 54.0).missing), (50.0, 0.0));

@@ -40,7 +40,7 @@ const SLIP: f64 = 2.0;
 const LEAST_SPEED: f64 = 1.0;
 /// Share of the usual count below which what is left of a target is about to be hidden, and not to stop.
 const HIDDEN: f64 = 0.6;
-/// Share of the usual count that is missing where what is left tells nothing of the target's ends.
+/// Share of the usual count that is missing where what is left shows nothing of the target's ends.
 const HARDLY: f64 = 0.6;
 /// Frames without motion after which the target counts as lost.
 const LOST_AFTER: usize = 15;
@@ -48,12 +48,12 @@ const LOST_AFTER: usize = 15;
 const MIN_SPEED: f64 = 0.3;
 
 /// Moving pixels around the target, over those of all that moves, from which on they are more than a few
-/// strays.
+/// outliers.
 const ALL: f64 = 0.25;
 /// What is said where what is around the target moves as well.
 const ALL_MOVES: &str = "all around the target moves, too";
 
-/// What a pair of windows tells.
+/// Measurement of a pair of windows.
 #[derive(Debug, Clone, Copy)]
 struct Measured {
     mean: MeanFlow,
@@ -199,7 +199,7 @@ impl LocalLoop {
         let of_mean = [0, 1].map(|k| mean.centroid[k] + self.rules.brought * mean.velocity[k]);
         let Some(ends) = ends else { return (of_mean, self.size.map(|length| missing * length)) };
         let between = self.extent.middle(ends, self.filter.position(), self.lengths);
-        // Of what hardly shows the ends are anything's.
+        // Of what shows little the ends are anything's.
         let hardly = if missing > HARDLY { missing } else { 0.0 };
         let lean = |k: usize| self.size[k] * between[k].map_or(missing, |middle| middle.missing.max(hardly));
         ([0, 1].map(|k| between[k].map_or(of_mean[k], |middle| middle.at)), [0, 1].map(lean))
@@ -309,7 +309,7 @@ impl LocalLoop {
     }
 
     /// Whether most of what is around the target moves, and is a good part of all that does: the camera
-    /// moves, or the window shows something else.
+    /// moves, or the window shows another object.
     fn all_moves(&self, flow: &LocalFlow, mean: &MeanFlow, min_speed: f64) -> bool {
         let (mut moving, mut all) = (0, 0);
         for w in self.around(flow) {

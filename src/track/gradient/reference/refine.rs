@@ -52,7 +52,7 @@ pub fn refine_flow(first: &Frame<f64>, second: &Frame<f64>, options: &RefineOpti
     LocalFlow { flow: field, accepted }
 }
 
-/// Steps (9) at one level; tells which pixels were accepted at their last one.
+/// Steps (9) at one level; returns which pixels were accepted at their last one.
 fn refine_level(
     first: &Frame<f64>,
     second: &Frame<f64>,
@@ -75,7 +75,7 @@ fn refine_level(
                 continue;
             }
             let residual = equations.residual(at);
-            // Strictly: at a fixed point it would never fail otherwise (10).
+            // Strictly: at a fixed point it would never fail (10).
             if residual >= best.data()[at] {
                 active.data_mut()[at] = false;
                 trial.data_mut()[at] = field.data()[at];
