@@ -6,34 +6,34 @@ use crate::types::{Frame, TargetBox};
 /// Change over the noise of a difference that is one.
 const CHANGE: f64 = 3.0;
 /// Least noise, grey levels.
-const LEAST_NOISE: f64 = 1.0;
+const MIN_NOISE: f64 = 1.0;
 /// Noise that a still camera has at most, grey levels: all that a moving one changes is not noise.
-const MOST_NOISE: f64 = 5.0;
+const MAX_NOISE: f64 = 5.0;
 /// Share of the frame that changes when the camera moves.
-const MUCH: f64 = 0.1;
+const MIN_CAMERA_CHANGE: f64 = 0.1;
 /// Changed pixels among the nine around a pixel that make it more than noise.
-const CROWD: usize = 3;
+const MIN_CHANGED_NEIGHBOURS: usize = 3;
 /// Side of the squares that pixels are gathered in, px.
 const CELL: usize = 8;
 /// Share of the longer one's extent that two ends of an object have in common.
 const SAME_EXTENT: f64 = 0.7;
 /// What noise and soft edges add to the thickness of the ends of an object, which is how far it moved, px.
-const SOFT: f64 = 3.0;
+const EDGE_WIDTH: f64 = 3.0;
 /// Fewest changed pixels of an object.
-const FEWEST: usize = 8;
+const MIN_PIXELS: usize = 8;
 /// Farthest displacement from frame to frame, px.
-const REACH: isize = 10;
+const MAX_DISPLACEMENT: isize = 10;
 /// Of displacements whose cost is within this factor of the best, or that leave no more than so many times
 /// the noise, the smallest is taken: larger ones explain an even target as well. Noise alone leaves 1.13
 /// times.
-const ALIKE: (f64, f64) = (1.05, 1.4);
+const EQUAL_COST: (f64, f64) = (1.05, 1.4);
 /// Difference that all larger ones count as, grey levels.
-const CAP: f64 = 40.0;
+const MAX_DIFFERENCE: f64 = 40.0;
 /// Pixels of an object that judge a displacement, about: of larger ones every second along both axes, every
 /// third ...
 const VOTES: f64 = 4096.0;
 /// Smallest side of what is found, px.
-const LEAST_SIDE: f64 = 3.0;
+const MIN_SIDE: f64 = 3.0;
 
 /// A moving object in two successive frames.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,10 +53,10 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
     if first.size() != second.size() {
         return None;
     }
-    let noise = noise_of(first, second).max(LEAST_NOISE);
+    let noise = noise_of(first, second).max(MIN_NOISE);
     let changed = changed(first, second, noise);
     let mut objects = objects(&crowded(&changed));
-    objects.retain(|pixels| pixels.len() >= FEWEST);
+    objects.retain(|pixels| pixels.len() >= MIN_PIXELS);
     let rank = |pixels: &[(usize, usize)]| near.map_or(-(pixels.len() as f64), |at| distance(pixels, at));
     let chosen = (0..objects.len()).min_by(|a, b| rank(&objects[*a]).total_cmp(&rank(&objects[*b])))?;
     let object = objects.swap_remove(chosen);
@@ -70,7 +70,7 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
         .filter_map(|other| {
             let both = [&object[..], other].concat();
             let (cost, displacement) = explain(&both)?;
-            let explained = cost <= ALIKE.1 * noise && are_as_thick(&object, other, displacement);
+            let explained = cost <= EQUAL_COST.1 * noise && are_as_thick(&object, other, displacement);
             explained.then_some((displacement, both))
         });
     // The nearest: there may be others like it, farther on.
@@ -81,7 +81,7 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
         None => (explain(&object)?.1, object),
     };
     let bounds = bounds(extent(&object), displacement);
-    (bounds.width >= LEAST_SIDE && bounds.height >= LEAST_SIDE)
+    (bounds.width >= MIN_SIDE && bounds.height >= MIN_SIDE)
         .then_some(MovingTarget { bounds, displacement: displacement.map(|d| d as f64) })
 }
 
@@ -96,9 +96,9 @@ pub(super) fn camera_moved(first: &Frame<f64>, second: &Frame<f64>) -> bool {
     if !crate::ablation::keeps("gradient.detect_camera") {
         return false;
     }
-    let changed = changed(first, second, LEAST_NOISE.max(noise_of(first, second).min(MOST_NOISE)));
+    let changed = changed(first, second, MIN_NOISE.max(noise_of(first, second).min(MAX_NOISE)));
     let count = changed.data().iter().filter(|changed| **changed).count();
-    count as f64 > MUCH * changed.data().len() as f64
+    count as f64 > MIN_CAMERA_CHANGE * changed.data().len() as f64
 }
 
 /// Whether two groups of changed pixels may be the ends of one object: they have nearly the same extent along
@@ -117,7 +117,7 @@ fn are_ends(a: &[(usize, usize)], b: &[(usize, usize)]) -> bool {
 fn are_as_thick(a: &[(usize, usize)], b: &[(usize, usize)], displacement: [isize; 2]) -> bool {
     let (a, b) = (extent(a), extent(b));
     (0..2).filter(|&k| a[k][1] < b[k][0] || b[k][1] < a[k][0]).all(|k| {
-        let most = displacement[k].unsigned_abs() as f64 + SOFT;
+        let most = displacement[k].unsigned_abs() as f64 + EDGE_WIDTH;
         [a, b].iter().all(|part| (part[k][1] - part[k][0] + 1) as f64 <= most)
     })
 }
@@ -133,7 +133,8 @@ fn crowded(changed: &Frame<bool>) -> Frame<bool> {
     let count = |mask: &Frame<bool>, x: usize, y: usize| {
         around(y, height).map(|j| mask.row(j)[around(x, width)].iter().filter(|c| **c).count()).sum::<usize>()
     };
-    let middle = Frame::from_fn(width, height, |x, y| changed.get(x, y) && count(changed, x, y) >= CROWD);
+    let middle =
+        Frame::from_fn(width, height, |x, y| changed.get(x, y) && count(changed, x, y) >= MIN_CHANGED_NEIGHBOURS);
     Frame::from_fn(width, height, |x, y| changed.get(x, y) && count(&middle, x, y) > 0)
 }
 
@@ -193,20 +194,20 @@ fn displacement(
         let step = ((width * height / VOTES).sqrt().ceil() as usize).max(1);
         let pixels = inside(y, height).step_by(step).flat_map(|j| inside(x, width).step_by(step).map(move |i| (i, j)));
         let off = pixels.map(|(i, j)| match (read(second, i, j), read(between, i - dx, j - dy)) {
-            (Some(now), Some([low, high])) => (low - now).max(now - high).clamp(0.0, CAP),
-            _ => CAP,
+            (Some(now), Some([low, high])) => (low - now).max(now - high).clamp(0.0, MAX_DIFFERENCE),
+            _ => MAX_DIFFERENCE,
         });
         let (sum, count) = off.fold((0.0, 0), |(sum, count), off| (sum + off, count + 1));
-        if width < LEAST_SIDE || height < LEAST_SIDE { f64::INFINITY } else { sum / f64::from(count.max(1)) }
+        if width < MIN_SIDE || height < MIN_SIDE { f64::INFINITY } else { sum / f64::from(count.max(1)) }
     };
-    let all: Vec<_> = (-REACH..=REACH)
-        .flat_map(|dy| (-REACH..=REACH).map(move |dx| (dx, dy)))
+    let all: Vec<_> = (-MAX_DISPLACEMENT..=MAX_DISPLACEMENT)
+        .flat_map(|dy| (-MAX_DISPLACEMENT..=MAX_DISPLACEMENT).map(move |dx| (dx, dy)))
         .filter(|d| *d != (0, 0))
         .map(|(dx, dy)| (cost(dx, dy), [dx, dy]))
         .collect();
     let best = all.iter().map(|(cost, _)| *cost).fold(f64::INFINITY, f64::min);
     let size = |d: &[isize; 2]| d[0] * d[0] + d[1] * d[1];
-    let bar = (ALIKE.0 * best).max(ALIKE.1 * noise);
+    let bar = (EQUAL_COST.0 * best).max(EQUAL_COST.1 * noise);
     let alike = all.into_iter().filter(|(cost, _)| *cost <= bar);
     alike.min_by_key(|(_, d)| size(d))
 }

@@ -6,16 +6,16 @@ use super::task::{Matrix, MotionModel, Task, Vector, Vote};
 use crate::math::robust_std;
 
 /// Steps at a level.
-const STEPS: usize = 6;
+const MAX_STEPS: usize = 6;
 /// A level is left when a step is shorter, px.
-const SETTLED: f64 = 0.01;
+const MIN_STEP: f64 = 0.01;
 /// Least deviation of the residual, share of the range of the model.
-const LEAST_SHARE: f64 = 0.03;
+const MIN_STD_PER_RANGE: f64 = 0.03;
 /// What turning a target changes of its picture, over what growing does, squared, below which it is round:
 /// that much is noise. A square has a third.
-const ROUND: f64 = 0.1;
+const MAX_ROUND_INFORMATION: f64 = 0.1;
 /// What the covariance is multiplied by: neighbouring residuals are not independent.
-const CORRELATED: f64 = 4.0;
+const CORRELATION_FACTOR: f64 = 4.0;
 
 /// Where the target was found.
 #[derive(Debug, Clone, Copy)]
@@ -32,7 +32,7 @@ pub(super) struct Alignment {
 /// The residual's deviation, robustly.
 fn deviation(votes: &[Vote], noise: f64, range: f64) -> f64 {
     let mut sizes: Vec<f64> = votes.iter().map(|vote| vote.residual.abs()).collect();
-    (robust_std(&mut sizes).unwrap_or(0.0)).max(noise).max(LEAST_SHARE * range)
+    (robust_std(&mut sizes).unwrap_or(0.0)).max(noise).max(MIN_STD_PER_RANGE * range)
 }
 
 /// Weighted normal equations `J'WJ` and `J'Wr`; outliers count little (S. Geman and D. McClure).
@@ -62,7 +62,7 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Alignment
     for &sigma in task.levels {
         let mut level = Level::new(task, &pose, sigma, &near);
         let silent = level.silent(&pose, gain);
-        for _ in 0..STEPS {
+        for _ in 0..MAX_STEPS {
             let range = level.vote(&pose, gain, silent.as_ref());
             if level.votes.len() < unknowns {
                 return None;
@@ -76,7 +76,7 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Alignment
                 matrix[(k, k)] += if k < unknowns { prior[k] } else { 1.0 };
             }
             let round = crate::ablation::keeps("gradient.round")
-                && matrix[(3, 3)] - prior[3] < ROUND * (matrix[(2, 2)] - prior[2]);
+                && matrix[(3, 3)] - prior[3] < MAX_ROUND_INFORMATION * (matrix[(2, 2)] - prior[2]);
             let inverse = matrix.cholesky()?.inverse();
             let mut delta = -(inverse * (right + prior.component_mul(&total)));
             let length = delta[0].hypot(delta[1]);
@@ -86,7 +86,7 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Alignment
             pose = pose.moved(&task.motion_model.increment(&delta));
             total += delta;
             last = Some((inverse, s, round));
-            if length < SETTLED {
+            if length < MIN_STEP {
                 break;
             }
         }
@@ -97,7 +97,7 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Alignment
         return None;
     }
     let d = pose.a;
-    let inner = |i: usize, j: usize| CORRELATED * s * s * inverse[(i, j)];
+    let inner = |i: usize, j: usize| CORRELATION_FACTOR * s * s * inverse[(i, j)];
     let covariance = std::array::from_fn(|i| {
         std::array::from_fn(|j| {
             (0..2).map(|k| (0..2).map(|l| d[i][k] * inner(k, l) * d[j][l]).sum::<f64>()).sum::<f64>()

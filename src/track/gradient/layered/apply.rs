@@ -1,6 +1,9 @@
 //! What a measurement changes of all that is known of the target, and what a frame without one does.
 
-use super::finding::{COVERED, DROP, Finding, LEAST, RESIZED, SEARCHED, TOUCHED, WELL, YOUNG};
+use super::finding::{
+    COVERED, Finding, MIN_VISIBILITY, MIN_VISIBILITY_LOSS, MIN_VISIBILITY_TO_LEARN, RESIZED, SEARCHED, SETTLING_FRAMES,
+    TOUCHED,
+};
 use super::last_good::{DAMPED, keep_last_good};
 use super::learn;
 use super::pose::Pose;
@@ -10,19 +13,19 @@ use crate::track::gradient::gauss_markov::Measurement;
 use crate::types::Frame;
 
 /// Innovation squared of a target found by looking all around from which on its velocity says nothing.
-const JUMPED: f64 = 100.0;
+const JUMP_INNOVATION: f64 = 100.0;
 /// Frames after a look-alike touched for which it is reckoned with.
-const WARY: usize = 8;
+const LOOK_ALIKE_FRAMES: usize = 8;
 /// Minimum share of the possible information about the rotation for it to be reported; else the angle is
 /// held. Round targets are known by their outline: this bounds what errors of that may turn.
-const TOLD: f64 = 0.75;
+const MIN_ROTATION_INFORMATION: f64 = 0.75;
 /// Least deviation of a measured position, px.
-const LEAST_DEVIATION: f64 = 0.05;
+const MIN_POSITION_STD: f64 = 0.05;
 /// Frames after an interruption in which what is not seen of the target may be hidden still.
-const RETURNING: usize = 3;
+const REAPPEARING_FRAMES: usize = 3;
 /// How far a target must have gone while it is young, over its shorter side, for what else its box holds
 /// to have stayed behind; slower ones wait for that in vain.
-const FAR: f64 = 0.4;
+const MIN_WAY_PER_SIDE: f64 = 0.4;
 /// Rate of the mean visibility.
 const VISIBILITY_RATE: f64 = 0.1;
 
@@ -38,7 +41,8 @@ pub(super) fn apply_measurement(state: &mut State, found: &Finding, frame: &Fram
     let interrupted = state.history.missed > 0 || state.history.occluded || occluded;
     let mut pose = aligned.pose;
     if let Some(told) = aligned.rotation_observable {
-        state.motion.rotation_observable = told >= TOLD || occluded && state.motion.rotation_observable;
+        state.motion.rotation_observable =
+            told >= MIN_ROTATION_INFORMATION || occluded && state.motion.rotation_observable;
     }
     let at = state.position(&pose);
     if crate::ablation::keeps("gradient.hold_angle") && !state.motion.rotation_observable && !occluded {
@@ -48,7 +52,7 @@ pub(super) fn apply_measurement(state: &mut State, found: &Finding, frame: &Fram
         state.uncertainty.noise_to_contrast = (state.scene.noise / score.contrast.max(1.0)).min(1.0);
     }
     state.history.reappearing =
-        if state.history.missed > 0 { RETURNING } else { state.history.reappearing.saturating_sub(1) };
+        if state.history.missed > 0 { REAPPEARING_FRAMES } else { state.history.reappearing.saturating_sub(1) };
     // Where a part of it is still hidden, all of it may be that much farther on.
     let behind = if crate::ablation::keeps("gradient.returning_variance") && state.history.reappearing > 0 {
         state.side() * (1.0 - score.visibility)
@@ -57,12 +61,12 @@ pub(super) fn apply_measurement(state: &mut State, found: &Finding, frame: &Fram
     };
     let visible = score.visibility.max(0.1);
     let variance: [f64; 2] = std::array::from_fn(|k| {
-        let own = aligned.covariance[k][k].max(LEAST_DEVIATION.powi(2)) / (visible * visible);
+        let own = aligned.covariance[k][k].max(MIN_POSITION_STD.powi(2)) / (visible * visible);
         own + behind * behind + if occluded { (1.5 * (1.0 - score.visibility)).powi(2) } else { 0.0 }
     });
     let step = state.motion.last_position.filter(|_| !interrupted).map(|before| [at[0] - before[0], at[1] - before[1]]);
     if (found.reason == SEARCHED || found.reason == RESIZED)
-        && found.nis > JUMPED
+        && found.nis > JUMP_INNOVATION
         && crate::ablation::keeps("gradient.restart_filter")
     {
         // Nobody moves like that: it is begun again where it was found.
@@ -82,23 +86,27 @@ pub(super) fn apply_measurement(state: &mut State, found: &Finding, frame: &Fram
     (state.history.missed, state.history.occluded) = (0, occluded);
     state.history.occluded_frames = if occluded { state.history.occluded_frames + 1 } else { 0 };
     state.history.look_alike_cooldown =
-        if found.reason == TOUCHED { WARY } else { state.history.look_alike_cooldown.saturating_sub(1) };
+        if found.reason == TOUCHED { LOOK_ALIKE_FRAMES } else { state.history.look_alike_cooldown.saturating_sub(1) };
     state.history.age += 1;
     state.history.max_visibility =
         if occluded { state.history.max_visibility } else { state.history.max_visibility.max(score.visibility) };
     if crate::ablation::keeps("gradient.lasting_cover")
         && found.reason == COVERED
-        && score.visibility > state.history.mean_visibility - DROP
+        && score.visibility > state.history.mean_visibility - MIN_VISIBILITY_LOSS
     {
         // What stays hidden, though it is little, is not covered but gone.
         state.history.mean_visibility += VISIBILITY_RATE * (score.visibility - state.history.mean_visibility);
     }
     let [right, down] = state.motion.filter.speed();
-    let far = right.hypot(down) * YOUNG as f64 > FAR * state.side() * state.motion.pose.scale();
-    if state.history.age >= YOUNG && (occluded || !far || score.visibility >= WELL) {
+    let far = right.hypot(down) * SETTLING_FRAMES as f64 > MIN_WAY_PER_SIDE * state.side() * state.motion.pose.scale();
+    if state.history.age >= SETTLING_FRAMES && (occluded || !far || score.visibility >= MIN_VISIBILITY_TO_LEARN) {
         state.history.adapts_until = 0;
     }
-    let least = if state.history.age <= YOUNG || state.is_adapting() { LEAST[0] } else { WELL };
+    let least = if state.history.age <= SETTLING_FRAMES || state.is_adapting() {
+        MIN_VISIBILITY[0]
+    } else {
+        MIN_VISIBILITY_TO_LEARN
+    };
     if !occluded && score.visibility >= least {
         learn_from(state, frame, aligned.gain, score.visibility);
     } else if crate::ablation::keeps("gradient.learn_fresh") && state.target.fresh.is_some() {

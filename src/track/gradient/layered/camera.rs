@@ -3,7 +3,7 @@
 use super::layers::{grown, is_inside};
 use super::nearby::nearby;
 use super::patch::smooth;
-use super::samples::{AROUND, SCATTER_SAMPLES, Samples, spread};
+use super::samples::{SCATTER_SAMPLES, SCENE_MARGIN, Samples, spread};
 use crate::image::cubic_at;
 use crate::math::robust_std;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
@@ -16,7 +16,7 @@ const FACTORS: [usize; 3] = [4, 2, 1];
 /// Gaussian after the reduction, reduced px.
 const SIGMA: f64 = 1.0;
 /// Shortest motion that is believed, px.
-const LEAST_MOTION: f64 = 0.05;
+const MIN_MOTION: f64 = 0.05;
 /// A frame and its reductions, made when they are first needed: the next frame needs them again.
 #[derive(Debug, Default)]
 pub(super) struct FramePyramid {
@@ -64,7 +64,7 @@ fn scene_motion(
     noise: f64,
     before: [f64; 2],
 ) -> [f64; 2] {
-    let hidden = grown(target, (0.0, AROUND));
+    let hidden = grown(target, (0.0, SCENE_MARGIN));
     let swinging = before != [0.0; 2];
     let mut motion = [0.0; 2];
     for factor in FACTORS {
@@ -73,7 +73,7 @@ fn scene_motion(
         let reduced = |m: f64| m / f;
         let found = samples.refine(next, motion.map(reduced), noise);
         let finest = factor == 1;
-        let believed = |m: [f64; 2]| m[0].hypot(m[1]) > LEAST_MOTION / f && samples.explain(next, m);
+        let believed = |m: [f64; 2]| m[0].hypot(m[1]) > MIN_MOTION / f && samples.explain(next, m);
         // Most cameras stand still: the coarsest pictures, which have the least noise, decide it already.
         let asked = finest || factor == FACTORS[0] && !swinging;
         match found.filter(|m| !asked || believed(*m)) {
@@ -89,7 +89,7 @@ fn scene_motion(
 /// differences from their median, robustly, where the scene moved by `motion` in the picture. Light that
 /// falls on all of it alike is no scatter.
 pub(super) fn scatter(previous: &Frame<f64>, now: &Frame<f64>, target: TargetBox, motion: [f64; 2]) -> f64 {
-    let hidden = grown(target, (0.0, AROUND));
+    let hidden = grown(target, (0.0, SCENE_MARGIN));
     let still = motion == [0.0; 2];
     let change = |(x, y): (usize, usize)| {
         let place = [x as f64 + motion[0], y as f64 + motion[1]];

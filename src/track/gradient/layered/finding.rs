@@ -12,25 +12,25 @@ pub(super) const PRIOR: [f64; 2] = [3.0, 0.02];
 /// Levels of a frame like the one before, and of one after an interruption; px.
 pub(super) const LEVELS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
 /// Least visibility of a target that is seen well.
-pub(super) const WELL: f64 = 0.75;
+pub(super) const MIN_VISIBILITY_TO_LEARN: f64 = 0.75;
 /// Least visibility that is measured; and after a miss.
-pub(super) const LEAST: [f64; 2] = [0.35, 0.5];
+pub(super) const MIN_VISIBILITY: [f64; 2] = [0.35, 0.5];
 /// Innovation squared from which on a measurement is doubted.
-pub(super) const DOUBT: f64 = 12.0;
+pub(super) const DOUBTED_INNOVATION: f64 = 12.0;
 /// Frames in which the support is still adapting to what the box holds.
-pub(super) const YOUNG: usize = 6;
+pub(super) const SETTLING_FRAMES: usize = 6;
 /// What is said of a target that an object hides in part.
 pub(super) const COVERED: &str = "something covers the target";
 /// Part of the target's area that may look like it beside it.
-pub(super) const LEAK: f64 = 0.06;
+pub(super) const MAX_ADJACENT_SHARE: f64 = 0.06;
 /// What is said then.
 pub(super) const TOUCHED: &str = "something like the target touches it";
 /// What is said of a target that was looked for.
 pub(super) const SEARCHED: &str = "found by looking all around";
 /// Loss of visibility that is one.
-pub(super) const DROP: f64 = 0.08;
+pub(super) const MIN_VISIBILITY_LOSS: f64 = 0.08;
 /// Innovation squared up to which a measurement is not questioned when the camera moves.
-pub(super) const SURE: f64 = 4.0;
+pub(super) const MAX_UNDOUBTED_INNOVATION: f64 = 4.0;
 /// Reason of a target found at another size.
 pub(super) const RESIZED: &str = "what seemed to cover the target was a change of its size";
 

@@ -12,20 +12,20 @@ use crate::track::gradient::detect::half_a_pixel_around;
 use crate::types::{Frame, TargetBox};
 
 /// Frames that are waited for the target to move.
-const FRAMES: usize = 12;
+const MAX_FRAMES: usize = 12;
 /// Farthest displacement from the first frame, px.
-const FARTHEST: isize = 20;
+const MAX_DISPLACEMENT: isize = 20;
 /// Farthest displacement from where it is expected, px: in the first step, and later.
 const REACH: [isize; 2] = [10, 5];
 /// Change over the deviation of a difference that noise does not make.
 const CHANGE: f64 = 3.0;
 /// Difference that all larger ones count as, grey levels.
-const CAP: f64 = 40.0;
+const MAX_CHANGE: f64 = 40.0;
 /// Of the displacements that explain the frames nearly as well as the best the smallest is taken: worse by
 /// this share, or by this share of a strip a pixel wide along the shorter side.
 const NEARLY: [f64; 2] = [0.05, 0.25];
 /// Share of the change that may be left.
-const LEFT: f64 = 0.5;
+const MAX_CHANGE_LEFT: f64 = 0.5;
 /// Pixels that judge a displacement, about.
 const VOTES: f64 = 1024.0;
 
@@ -48,7 +48,7 @@ pub(super) struct InitialSegmentation {
 
 impl InitialSegmentation {
     pub fn new(frame: &Frame<f64>, bounds: TargetBox, target: Target) -> Self {
-        let reach = [bounds.width, bounds.height].map(|side| side / 2.0 + FARTHEST as f64 + 2.0);
+        let reach = [bounds.width, bounds.height].map(|side| side / 2.0 + MAX_DISPLACEMENT as f64 + 2.0);
         let cut = bounds_about(bounds.centre(), reach, frame.size());
         let first = Patch::cut(frame, cut);
         let ((width, height), [x0, y0]) = (first.frame.size(), first.corner);
@@ -59,7 +59,7 @@ impl InitialSegmentation {
 
     /// Whether nothing more is waited for.
     pub fn is_over(&self) -> bool {
-        self.frames >= FRAMES || self.moved.iter().any(|moved| moved.abs() >= FARTHEST)
+        self.frames >= MAX_FRAMES || self.moved.iter().any(|moved| moved.abs() >= MAX_DISPLACEMENT)
     }
 
     /// A frame that is not looked at.
@@ -88,7 +88,7 @@ impl InitialSegmentation {
         self.frames
     }
 
-    /// Displacement of all that moved since the first frame, px; `None` if the last frame does not determine it.
+    /// Displacement of all that moved since the first frame, px; `None` if the last frame does not show it.
     pub fn moved(&self) -> Option<[f64; 2]> {
         (self.told == self.frames && self.frames > 0).then(|| self.moved.map(|moved| moved as f64))
     }
@@ -136,7 +136,7 @@ impl Changes<'_> {
 
     /// What noise does not make of a change.
     fn excess(&self, change: f64) -> f64 {
-        (change - self.bar).clamp(0.0, CAP)
+        (change - self.bar).clamp(0.0, MAX_CHANGE)
     }
 
     /// The smallest displacement of the box that explains nearly as much as any; `None` where nothing moves,
@@ -159,7 +159,7 @@ impl Changes<'_> {
             .collect();
         let best = all.iter().map(|(cost, _)| *cost).fold(f64::INFINITY, f64::min);
         let bar = best + NEARLY[0] * best + NEARLY[1] * self.contrast() * self.outset.side();
-        if rest <= bar || best > LEFT * rest {
+        if rest <= bar || best > MAX_CHANGE_LEFT * rest {
             return None;
         }
         let nearly = all.into_iter().filter(|(cost, _)| *cost <= bar);
@@ -198,7 +198,7 @@ impl Changes<'_> {
         let pixels = self.now.data().iter().zip(self.outset.first.frame.data());
         let changes = pixels.map(|(now, first)| self.excess((now - first).abs())).filter(|change| *change > 0.0);
         let (sum, count) = changes.fold((0.0, 0.0), |(sum, count), change| (sum + change, count + 1.0));
-        if count > 0.0 { sum / count } else { CAP }
+        if count > 0.0 { sum / count } else { MAX_CHANGE }
     }
 }
 

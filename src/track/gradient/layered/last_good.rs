@@ -5,19 +5,20 @@
 //! stays behind, and a filter that believed it leads the search away from where the target comes out again.
 //! The last state before that is therefore kept, and what vanishes goes on from there.
 
-use super::finding::{DROP, Finding};
+use super::finding::{Finding, MIN_VISIBILITY_LOSS};
 use super::state::{LastGood, State};
 use crate::types::TargetBox;
 
 /// Frames after which the state from before is too old to go on from.
-const LATELY: usize = 6;
+const MAX_FRAMES: usize = 6;
 /// Part of the acceleration that is kept, as where a known surface covers the target.
 pub(super) const DAMPED: f64 = 0.3;
 
 /// After a measurement: keeps the state if the target was seen whole; `smaller`: it shrank by what cover
 /// makes of it.
 pub(super) fn keep_last_good(state: &mut State, found: &Finding, smaller: bool) {
-    let whole = !found.occluded && !smaller && found.score.visibility >= state.history.mean_visibility - DROP;
+    let whole =
+        !found.occluded && !smaller && found.score.visibility >= state.history.mean_visibility - MIN_VISIBILITY_LOSS;
     if whole {
         state.last_good = Some(LastGood {
             filter: state.motion.filter.clone(),
@@ -41,7 +42,9 @@ pub(super) fn restore_last_good(state: &mut State) {
     if state.history.missed > 0 || !inside {
         return;
     }
-    let Some(sound) = state.last_good.take().filter(|sound| sound.followed && sound.frames <= LATELY) else { return };
+    let Some(sound) = state.last_good.take().filter(|sound| sound.followed && sound.frames <= MAX_FRAMES) else {
+        return;
+    };
     state.motion.filter = sound.filter;
     state.motion.filter.x.iter_mut().for_each(|x| x[2] *= DAMPED);
     (0..=sound.frames).for_each(|_| state.motion.filter.predict());
@@ -125,7 +128,7 @@ mod tests {
         };
         assert!(changed(&mislead), "the scene of this test says nothing");
         assert!(!changed(&|_, _| {}), "it vanished at once");
-        assert!(!changed(&|tracker, found| (0..=LATELY).for_each(|_| mislead(tracker, found))), "that is long ago");
+        assert!(!changed(&|tracker, found| (0..=MAX_FRAMES).for_each(|_| mislead(tracker, found))), "that is long ago");
         assert!(
             !changed(&|tracker, found| {
                 mislead(tracker, found);

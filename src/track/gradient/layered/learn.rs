@@ -3,7 +3,7 @@
 use super::layers::{Background, PRIOR, Target};
 use super::patch::{dilated, smooth_known};
 use super::score::View;
-use super::state::LEAST_NOISE;
+use super::state::MIN_NOISE;
 use crate::math::robust_std;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::{Frame, TargetBox};
@@ -161,5 +161,5 @@ pub(super) fn learn_noise(noise: Option<f64>, previous: &Frame<f64>, frame: &Fra
     let pairs = frame.data().iter().zip(previous.data()).step_by(every);
     let mut off: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).collect();
     let now = robust_std(&mut off).unwrap_or(0.0) / std::f64::consts::SQRT_2;
-    noise.map_or(now, |noise| noise + NOISE_RATE * (now - noise)).max(LEAST_NOISE)
+    noise.map_or(now, |noise| noise + NOISE_RATE * (now - noise)).max(MIN_NOISE)
 }

@@ -1,16 +1,16 @@
 //! What brightens the whole picture: the light, and a camera's black level.
 
 use super::layers::{Background, grown};
-use super::samples::{AROUND, CAP, LESS, spread};
+use super::samples::{MAX_RESIDUAL, MAX_RESIDUAL_RATIO, SCENE_MARGIN, spread};
 use crate::track::gradient::noise::median;
 use crate::types::{Frame, TargetBox};
 
 /// Pixels that the light is measured on, at most.
 const LIGHT_SAMPLES: usize = 1024;
 /// Brightness ratios nearer to 1 are none.
-const LEAST_LIGHT: f64 = 0.01;
+const MIN_GAIN_CHANGE: f64 = 0.01;
 /// Least jump of the whole scene's level that is taken for one, grey levels.
-const JUMP: f64 = 64.0;
+const MIN_LEVEL_JUMP: f64 = 64.0;
 
 /// What the light made of the scene's brightness b: it is seen as `gain b + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,16 +34,17 @@ impl Light {
 /// The light of the frame against that of the background, where both are known: a robust ratio where that
 /// explains the frame better, or else a jump of the level, which no light makes but some cameras do.
 pub(super) fn light(frame: &Frame<f64>, background: &Background, target: TargetBox) -> Light {
-    let hidden = grown(target, (0.0, AROUND));
+    let hidden = grown(target, (0.0, SCENE_MARGIN));
     let pairs: Vec<[f64; 2]> = spread(frame.size(), hidden, LIGHT_SAMPLES)
         .filter(|(x, y)| background.known.get(*x, *y))
         .map(|(x, y)| [frame.get(x, y), background.picture.get(x, y)])
         .collect();
-    let residual = |light: Light| pairs.iter().map(|[e, b]| (light.undone(*e) - b).abs().min(CAP)).sum::<f64>();
-    let better = |light: Light, than: Light| residual(light) < LESS * residual(than);
+    let residual =
+        |light: Light| pairs.iter().map(|[e, b]| (light.undone(*e) - b).abs().min(MAX_RESIDUAL)).sum::<f64>();
+    let better = |light: Light, than: Light| residual(light) < MAX_RESIDUAL_RATIO * residual(than);
     let mut ratios: Vec<f64> = pairs.iter().filter(|[_, b]| *b > 1.0).map(|[e, b]| e / b).collect();
     let gain = median(&mut ratios);
-    let possible = (0.1..10.0).contains(&gain) && (gain - 1.0).abs() >= LEAST_LIGHT;
+    let possible = (0.1..10.0).contains(&gain) && (gain - 1.0).abs() >= MIN_GAIN_CHANGE;
     let brighter = Light { gain, ..Light::USUAL };
     let found = if crate::ablation::keeps("gradient.light_gain") && possible && better(brighter, Light::USUAL) {
         brighter
@@ -52,7 +53,8 @@ pub(super) fn light(frame: &Frame<f64>, background: &Background, target: TargetB
     };
     let mut differences: Vec<f64> = pairs.iter().map(|[e, b]| e - b).collect();
     let jumped = Light { offset: median(&mut differences), ..Light::USUAL };
-    if crate::ablation::keeps("gradient.light_offset") && jumped.offset.abs() > JUMP && better(jumped, found) {
+    if crate::ablation::keeps("gradient.light_offset") && jumped.offset.abs() > MIN_LEVEL_JUMP && better(jumped, found)
+    {
         jumped
     } else {
         found

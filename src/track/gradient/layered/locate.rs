@@ -1,27 +1,30 @@
 //! The target in a frame: where the filter expects it, beside what covers or touches it, or all around.
 
-use super::finding::{DOUBT, Finding, LEAK, LEAST, LEVELS, PRIOR, SEARCHED, SURE, TOUCHED, WELL, try_at};
+use super::finding::{
+    DOUBTED_INNOVATION, Finding, LEVELS, MAX_ADJACENT_SHARE, MAX_UNDOUBTED_INNOVATION, MIN_VISIBILITY,
+    MIN_VISIBILITY_TO_LEARN, PRIOR, SEARCHED, TOUCHED, try_at,
+};
 use super::occlusion::{is_settled, locate_entering_occlusion, locate_occluded, may_be_held_back, position_std};
 use super::reshaped::locate_reshaped;
 use super::resized::locate_resized;
 use super::scene::shift;
 use super::search::search;
-use super::state::{GROWN, State};
+use super::state::{MIN_SCALE_CHANGE, State};
 use super::task::{MotionModel, VoteMask};
 use crate::types::Frame;
 
 /// That of size and angle where a look-alike touches, whose pull may go a long way with the target.
 pub(super) const STIFF: f64 = 0.005;
 /// Below this visibility it is looked for all around.
-pub(super) const BADLY: f64 = 0.6;
+pub(super) const MIN_VISIBILITY_WITHOUT_SEARCH: f64 = 0.6;
 /// Least difference of the target from what is behind it, over the noise.
-pub(super) const VISIBLE: f64 = 1.0;
+pub(super) const MIN_CONTRAST_PER_NOISE: f64 = 1.0;
 /// The same from which on, on one side, a look-alike touches.
 pub(super) const TOUCH: (f64, f64) = (0.08, 0.6);
 /// What is said where it did a moment ago, and its pull may still be felt.
 pub(super) const TOUCHED_BEFORE: &str = "something like the target touched it a moment ago";
 /// Loss of size from one frame to the next that only cover makes.
-pub(super) const SHRUNK: f64 = 0.1;
+pub(super) const MIN_SHRINKAGE: f64 = 0.1;
 /// Reach of the search, px: at first, and at most.
 pub(super) const REACH: (usize, usize) = (12, 36);
 
@@ -33,7 +36,9 @@ pub(super) fn locate(state: &State, frame: &Frame<f64>) -> Option<Finding> {
     let mut best = plain;
     let doubted = crate::ablation::keeps("gradient.occlusion")
         && plain.is_none_or(|found| {
-            found.score.visibility < WELL || found.nis > DOUBT || state.has_shrunk(&found.aligned.pose)
+            found.score.visibility < MIN_VISIBILITY_TO_LEARN
+                || found.nis > DOUBTED_INNOVATION
+                || state.has_shrunk(&found.aligned.pose)
         });
     let held_back = plain.filter(|plain| {
         crate::ablation::keeps("gradient.held_back") && is_settled(state) && may_be_held_back(state, plain)
@@ -58,18 +63,18 @@ pub(super) fn locate(state: &State, frame: &Frame<f64>) -> Option<Finding> {
     if let Some(reason) = touched {
         best = locate_beside_look_alike(state, frame, levels, reason).or(best);
     }
-    if best.is_none_or(|found| found.score.visibility < BADLY && !found.occluded) {
+    if best.is_none_or(|found| found.score.visibility < MIN_VISIBILITY_WITHOUT_SEARCH && !found.occluded) {
         best = search_around(state, frame).or(best);
     }
     if let Some(covered) = best.filter(|found| found.occluded) {
         best = locate_resized(state, frame, &covered).filter(|_| crate::ablation::keeps("gradient.resized")).or(best);
     }
     let best = best.filter(|found| !crate::ablation::keeps("gradient.remainder") || !is_remainder(state, found));
-    let least = LEAST[usize::from(state.history.missed > 0)];
+    let least = MIN_VISIBILITY[usize::from(state.history.missed > 0)];
     best.filter(|found| {
         found.score.visibility >= least
             && (!crate::ablation::keeps("gradient.minimum_contrast")
-                || found.score.contrast >= VISIBLE * state.scene.noise)
+                || found.score.contrast >= MIN_CONTRAST_PER_NOISE * state.scene.noise)
     })
 }
 
@@ -79,10 +84,12 @@ pub(super) fn locate(state: &State, frame: &Frame<f64>) -> Option<Finding> {
 /// would end at that edge.
 pub(super) fn is_remainder(state: &State, found: &Finding) -> bool {
     let pose = &found.aligned.pose;
-    let off = found.nis > DOUBT && found.score.leak < LEAK && state.has_shrunk(pose);
-    let shrunk = pose.scale() < (1.0 - SHRUNK) * state.motion.pose.scale();
+    let off = found.nis > DOUBTED_INNOVATION && found.score.leak < MAX_ADJACENT_SHARE && state.has_shrunk(pose);
+    let shrunk = pose.scale() < (1.0 - MIN_SHRINKAGE) * state.motion.pose.scale();
     let was_hidden = state.history.occluded || state.history.missed > 0;
-    !found.occluded && found.score.visibility < WELL && (state.history.occluded && off || was_hidden && shrunk)
+    !found.occluded
+        && found.score.visibility < MIN_VISIBILITY_TO_LEARN
+        && (state.history.occluded && off || was_hidden && shrunk)
 }
 
 /// Whether an object that looks like the target touches it: much of it beside the target, on one side. A
@@ -93,10 +100,10 @@ pub(super) fn look_alike_reason(state: &State, found: &Finding) -> Option<&'stat
     if found.score.leak > TOUCH.0 && found.score.one_sided > TOUCH.1 {
         return Some(TOUCHED);
     }
-    let grown = (found.aligned.pose.scale() / state.motion.pose.scale() - 1.0).abs() > GROWN;
+    let grown = (found.aligned.pose.scale() / state.motion.pose.scale() - 1.0).abs() > MIN_SCALE_CHANGE;
     (state.history.look_alike_cooldown > 0
         && crate::ablation::keeps("gradient.look_alike_cooldown")
-        && (found.nis > SURE || grown))
+        && (found.nis > MAX_UNDOUBTED_INNOVATION || grown))
         .then_some(TOUCHED_BEFORE)
 }
 
@@ -127,7 +134,7 @@ pub(super) fn search_around(state: &State, frame: &Frame<f64>) -> Option<Finding
     let place = search(frame, &state.target, &state.background, (&guess, 1.0), reach)?;
     let how = (MotionModel::Translation, VoteMask::None, PRIOR, &LEVELS[1..]);
     let found = try_at(state, frame, &place, how)?;
-    (found.score.visibility >= WELL).then_some(Finding { reason: SEARCHED, ..found })
+    (found.score.visibility >= MIN_VISIBILITY_TO_LEARN).then_some(Finding { reason: SEARCHED, ..found })
 }
 
 /// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the
@@ -138,8 +145,9 @@ pub(super) fn locate_with_camera(state: &mut State, frame: &Frame<f64>, motion: 
         shift(state, against);
     }
     let first = locate(state, frame);
-    let nis = |found: &Option<Finding>| found.map_or(f64::INFINITY, |f| if f.occluded { DOUBT } else { f.nis });
-    if !crate::ablation::keeps("gradient.with_camera") || motion == [0.0; 2] || nis(&first) < SURE {
+    let nis =
+        |found: &Option<Finding>| found.map_or(f64::INFINITY, |f| if f.occluded { DOUBTED_INNOVATION } else { f.nis });
+    if !crate::ablation::keeps("gradient.with_camera") || motion == [0.0; 2] || nis(&first) < MAX_UNDOUBTED_INNOVATION {
         return first;
     }
     let (there, back) = if state.motion.rides_camera { (motion, against) } else { (against, motion) };

@@ -56,7 +56,7 @@ use locate::locate_with_camera;
 use report::{hold_at_border, report};
 use restart::{resolve_initial, update_displacement_uncertainty};
 use scene::{follow_camera, is_blank, is_wild, measure_camera_motion, normalize_light};
-use state::LEAST_NOISE;
+use state::MIN_NOISE;
 
 /// What is said of a frame with NaN, infinity or numbers that are no brightness.
 const UNUSABLE: &str = "the frame cannot be used";
@@ -70,7 +70,7 @@ const WILD: &str = "the frame is nothing like those before";
 pub(super) fn stilled(frame: &Frame<f64>, next: &Frame<f64>) -> Option<Frame<f64>> {
     let nowhere = TargetBox::about([-1e6; 2], 0.0, 0.0);
     let seen = [frame, next].map(|frame| FramePyramid::new(frame.clone()));
-    let motion = camera::camera_motion(&seen[0], &seen[1], nowhere, LEAST_NOISE, [0.0; 2]);
+    let motion = camera::camera_motion(&seen[0], &seen[1], nowhere, MIN_NOISE, [0.0; 2]);
     (motion != [0.0; 2]).then(|| shifted(frame, motion.map(|m| -m)))
 }
 

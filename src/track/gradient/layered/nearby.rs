@@ -4,15 +4,15 @@
 //! of the background that the target is before, whose texture would be taken for the target's.
 
 use super::layers::{grown, holds};
-use super::samples::{AROUND, LESS, SAME, Samples};
+use super::samples::{MAX_RESIDUAL_RATIO, SAME_MOTION, SCENE_MARGIN, Samples};
 use crate::types::{Frame, TargetBox};
 
 /// Farthest from the target, px.
-const NEAR: f64 = 48.0;
+const MAX_DISTANCE: f64 = 48.0;
 /// Pixels that it is measured on, about.
 const SAMPLES: usize = 1024;
 /// Fewest of them.
-const FEWEST: usize = 256;
+const MIN_SAMPLES: usize = 256;
 /// Mean residual up to which the motion of the scene explains them: so many times the noise, and grey levels.
 const EXPLAINED: (f64, f64) = (3.0, 1.0);
 /// Farthest another motion may be from it along both axes, px.
@@ -27,7 +27,7 @@ pub(super) fn nearby(
     noise: f64,
 ) -> [f64; 2] {
     let samples = Samples::at(previous, around(target, previous.size()));
-    if samples.len() < FEWEST {
+    if samples.len() < MIN_SAMPLES {
         return scene;
     }
     let left = samples.capped(now, scene);
@@ -40,14 +40,14 @@ pub(super) fn nearby(
     let best = tried.map(|motion| (samples.capped(now, motion), motion)).min_by(|a, b| a.0.total_cmp(&b.0));
     let other = best.and_then(|(_, motion)| samples.refine(now, motion, noise)).filter(|other| {
         let apart = (other[0] - scene[0]).hypot(other[1] - scene[1]);
-        apart >= SAME && samples.capped(now, *other) < LESS * left
+        apart >= SAME_MOTION && samples.capped(now, *other) < MAX_RESIDUAL_RATIO * left
     });
     other.unwrap_or(scene)
 }
 
 /// Pixels around the target, spread evenly, two from the border at least.
 fn around(target: TargetBox, (width, height): (usize, usize)) -> Vec<(usize, usize)> {
-    let (hidden, reach) = (grown(target, (0.0, AROUND)), grown(target, (0.0, NEAR)));
+    let (hidden, reach) = (grown(target, (0.0, SCENE_MARGIN)), grown(target, (0.0, MAX_DISTANCE)));
     let step = ((reach.width * reach.height - hidden.width * hidden.height) / SAMPLES as f64).sqrt().ceil().max(1.0);
     let along = |from: f64, length: f64, size: usize| {
         let inside = |at: f64| (at.max(2.0) as usize).min(size.saturating_sub(2));

@@ -13,26 +13,26 @@ const CLEAR: f64 = 2.0;
 /// but for a pixel.
 const EDGE: f64 = 0.4;
 /// Fewest of them.
-const FEWEST: usize = 12;
+const MIN_PAIRS: usize = 12;
 /// Share of them that look as they should.
-const AGREED: f64 = 0.6;
+const MIN_AGREEING_SHARE: f64 = 0.6;
 /// Width of the mean of what is known to move, share of the shorter side, and least, px.
 const WIDTH: (f64, f64) = (0.25, 2.0);
 /// Difference from it, over its scatter, of what looks like the target; and grey levels.
-const ALIKE: (f64, f64) = (3.0, 6.0);
+const MAX_DIFFERENCE: (f64, f64) = (3.0, 6.0);
 /// Share of the box that may be hidden.
-const HIDDEN: [f64; 2] = [0.05, 0.9];
+const HIDDEN_SHARE_RANGE: [f64; 2] = [0.05, 0.9];
 /// Least distance of the middles of its two parts, over its shorter side: those of a box cut in two are half
 /// a side apart, those of a target that changes its shape are near each other.
-const APART: f64 = 0.3;
+const MIN_CENTER_DISTANCE: f64 = 0.3;
 /// Share of either part that may not do as it should.
-const STRAY: f64 = 0.02;
+const MAX_OUTLIER_SHARE: f64 = 0.02;
 /// Around the box, what is behind the target is measured on, px.
 const AROUND: usize = 3;
 /// Displacement, px squared, beyond which what moves is separated from what does not.
-const LEAST: isize = 2;
+const MIN_SQUARED_DISPLACEMENT: isize = 2;
 /// Longest way between pixels, as one counts that differ only by noise.
-const FAR: f64 = 1e6;
+const MAX_PATH_STEP: f64 = 1e6;
 
 /// Part of the first box is an object at rest in front of the target.
 #[derive(Debug)]
@@ -50,7 +50,7 @@ pub(super) fn find_occluder(initial: &mut InitialSegmentation, frame: &Frame<f64
     initial.advance();
     let changes = initial.changes(frame, noise);
     let moved = changes.displacement()?;
-    let told = moved[0] * moved[0] + moved[1] * moved[1] > LEAST;
+    let told = moved[0] * moved[0] + moved[1] * moved[1] > MIN_SQUARED_DISPLACEMENT;
     let hidden = if told && crate::ablation::keeps("gradient.start_occluder") { hidden(&changes, moved) } else { None };
     initial.keep_displacement(moved);
     hidden.map(|hidden| HiddenPart { moved: moved.map(|m| m as f64), frames: initial.frames(), hidden })
@@ -76,12 +76,13 @@ fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<bool>> {
             still.push(if came { from } else { to });
         }
     }
-    if (agreed as f64) < fewest.max(FEWEST as f64).max(AGREED * evidence.edge.len() as f64) {
+    if (agreed as f64) < fewest.max(MIN_PAIRS as f64).max(MIN_AGREEING_SHARE * evidence.edge.len() as f64) {
         return None;
     }
     let hidden = spread(changes, &evidence.moving, &still);
     let parts = Parts::of(changes, &hidden);
-    let cut = (HIDDEN[0]..HIDDEN[1]).contains(&parts.share) && parts.apart > APART * changes.outset.side();
+    let cut = (HIDDEN_SHARE_RANGE[0]..HIDDEN_SHARE_RANGE[1]).contains(&parts.share)
+        && parts.apart > MIN_CENTER_DISTANCE * changes.outset.side();
     (cut && is_so(changes, &hidden, moved)).then_some(hidden)
 }
 
@@ -101,7 +102,7 @@ fn is_so(changes: &Changes<'_>, hidden: &Frame<bool>, moved: [isize; 2]) -> bool
         counts[usize::from(is_hidden)] += 1.0;
         strays[usize::from(is_hidden)] += f64::from(u8::from(off));
     }
-    (0..2).all(|k| strays[k] <= STRAY * counts[k])
+    (0..2).all(|k| strays[k] <= MAX_OUTLIER_SHARE * counts[k])
 }
 
 /// The two parts of the box.
@@ -185,7 +186,7 @@ impl Appearance {
         let mean = smooth_known(&known, (WIDTH.0 * changes.outset.side()).max(WIDTH.1));
         let mut off: Vec<f64> = moving.iter().map(|[x, y]| (first.get(*x, *y) - mean.get(*x, *y)).abs()).collect();
         let scatter = robust_std(&mut off).unwrap_or(0.0);
-        (moving.len() >= FEWEST).then(|| Self {
+        (moving.len() >= MIN_PAIRS).then(|| Self {
             mean,
             scatter: scatter.max(changes.bar / 4.0),
             behind: behind(changes),
@@ -196,7 +197,7 @@ impl Appearance {
     fn holds(&self, value: f64, [x, y]: [usize; 2]) -> bool {
         let off = (value - self.mean.get(x, y)).abs();
         // Far from all that moves nothing is known, and nothing holds.
-        off < ALIKE.0 * self.scatter + ALIKE.1 && off < (value - self.behind).abs()
+        off < MAX_DIFFERENCE.0 * self.scatter + MAX_DIFFERENCE.1 && off < (value - self.behind).abs()
     }
 }
 
@@ -241,7 +242,7 @@ fn spread(changes: &Changes<'_>, moving: &[[usize; 2]], still: &[[usize; 2]]) ->
                 continue;
             }
             let step = (first.get(i, j) - first.get(x, y)) / changes.bar;
-            let longer = way + (1.0 + (3.0 * step).powi(2)).min(FAR) as u64;
+            let longer = way + (1.0 + (3.0 * step).powi(2)).min(MAX_PATH_STEP) as u64;
             if longer < reached.get(i, j) {
                 reached.row_mut(j)[i] = longer;
                 next.push(Reverse((longer, j, i, label)));

@@ -1,6 +1,9 @@
 //! Targets that a known surface covers in part, or begins to cover.
 
-use super::finding::{COVERED, DOUBT, DROP, Finding, LEAK, LEVELS, PRIOR, YOUNG, try_at};
+use super::finding::{
+    COVERED, DOUBTED_INNOVATION, Finding, LEVELS, MAX_ADJACENT_SHARE, MIN_VISIBILITY_LOSS, PRIOR, SETTLING_FRAMES,
+    try_at,
+};
 use super::score::Score;
 use super::state::State;
 use super::task::{MotionModel, VoteMask};
@@ -28,16 +31,19 @@ pub(super) fn locate_occluded(
     let dropped = |score: &Score, by: f64| score.visibility < state.history.mean_visibility - by;
     // What is seen as well as ever in a place that nobody expected has made a turn; unless it became
     // smaller at that, as what lies between the bars of a fence.
-    let turned =
-        |plain: &Finding| plain.nis > DOUBT && !dropped(&plain.score, SLIGHT) && !state.has_shrunk(&plain.aligned.pose);
+    let turned = |plain: &Finding| {
+        plain.nis > DOUBTED_INNOVATION && !dropped(&plain.score, SLIGHT) && !state.has_shrunk(&plain.aligned.pose)
+    };
     // Nor has one that is where it is expected but for a strip along its side, and would be smaller or
     // less seen elsewhere.
-    let begins = plain.is_some_and(|plain| plain.nis > DOUBT && !turned(&plain) && is_held_back(state, &found, &plain));
+    let begins = plain
+        .is_some_and(|plain| plain.nis > DOUBTED_INNOVATION && !turned(&plain) && is_held_back(state, &found, &plain));
     // The last strip of a large target is not to be taken for background.
-    let drop = if begins || state.history.occluded && is_large(state) { SLIGHT } else { DROP };
-    let also = plain.is_none_or(|plain| !turned(&plain) && (dropped(&plain.score, drop) || plain.nis > DOUBT));
+    let drop = if begins || state.history.occluded && is_large(state) { SLIGHT } else { MIN_VISIBILITY_LOSS };
+    let also =
+        plain.is_none_or(|plain| !turned(&plain) && (dropped(&plain.score, drop) || plain.nis > DOUBTED_INNOVATION));
     let held_back = plain.is_some_and(|plain| may_be_held_back(state, &plain) && is_held_back(state, &found, &plain));
-    let taken = found.score.leak < LEAK && dropped(&found.score, drop) && (also || held_back);
+    let taken = found.score.leak < MAX_ADJACENT_SHARE && dropped(&found.score, drop) && (also || held_back);
     taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
 }
 
@@ -48,7 +54,7 @@ pub(super) fn locate_entering_occlusion(state: &State, frame: &Frame<f64>, plain
     let side = VoteMask::Towards([expected[0] - at[0], expected[1] - at[1]]);
     let how = (MotionModel::Translation, side, PRIOR, &LEVELS[1..]);
     let found = try_at(state, frame, &state.expected(), how)?;
-    let taken = found.score.leak < LEAK && is_held_back(state, &found, plain);
+    let taken = found.score.leak < MAX_ADJACENT_SHARE && is_held_back(state, &found, plain);
     taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
 }
 
@@ -56,13 +62,13 @@ pub(super) fn locate_entering_occlusion(state: &State, frame: &Frame<f64>, plain
 /// not known, but of a large target that was seen whole: of a small one a wrong box leaves as much unseen
 /// as cover.
 pub(super) fn is_settled(state: &State) -> bool {
-    state.history.age >= YOUNG && !state.is_adapting()
+    state.history.age >= SETTLING_FRAMES && !state.is_adapting()
         || crate::ablation::keeps("gradient.known_if_large") && state.history.max_visibility > WHOLE && is_large(state)
 }
 
 /// Whether a strip along a side is little of the target.
 pub(super) fn is_large(state: &State) -> bool {
-    STRIP / state.side() < DROP
+    STRIP / state.side() < MIN_VISIBILITY_LOSS
 }
 
 /// Whether a large target is not where it is expected. The filter takes turns for granted, and is no
@@ -82,7 +88,7 @@ pub(super) fn is_held_back(state: &State, elsewhere: &Finding, plain: &Finding) 
     let strip = apart * state.side() / plain.aligned.pose.scale().max(0.1);
     crate::ablation::keeps("gradient.held_back")
         && apart > HELD_BACK
-        && elsewhere.nis < DOUBT
+        && elsewhere.nis < DOUBTED_INNOVATION
         && elsewhere.score.mismatch < plain.score.mismatch + strip
 }
 

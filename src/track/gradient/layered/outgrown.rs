@@ -10,21 +10,21 @@ use crate::track::gradient::detect::{MovingTarget, detect_moving_target};
 use crate::types::{Frame, TargetBox};
 
 /// Sides of what moves over those of a box that holds only the middle of it.
-const LARGER: [f64; 2] = [1.25, 2.5];
+const SIDE_RATIO_RANGE: [f64; 2] = [1.25, 2.5];
 /// Distance of the middles of the two, share of the box's sides.
-const ASIDE: f64 = 0.3;
+const MAX_CENTER_OFFSET: f64 = 0.3;
 /// Frames in which that may be seen: what turns goes beyond its box later.
-const SOON: usize = 4;
+const MAX_FRAMES: usize = 4;
 /// Changed pixels of a row or column that noise does not make, share of the box's shorter side, and least.
 const LINE: (f64, f64) = (0.2, 3.0);
 /// Share of what lies between the two that may not have moved with the target.
-const STRAYS: f64 = 0.15;
+const MAX_OUTLIER_SHARE: f64 = 0.15;
 
 impl InitialSegmentation {
     /// What moved, where the box holds only the middle of it: its outline goes on beyond the box on all
     /// sides, and what is between moved with it.
     pub fn outgrown(&self, frame: &Frame<f64>, noise: f64) -> Option<MovingTarget> {
-        if self.frames() > SOON {
+        if self.frames() > MAX_FRAMES {
             return None;
         }
         let changes = self.changes(frame, noise);
@@ -37,8 +37,8 @@ impl InitialSegmentation {
         let found = detect_moving_target(&self.first.frame, &changes.now, Some(near))?;
         let at = found.bounds.centre();
         let sides = [(found.bounds.width, self.bounds.width), (found.bounds.height, self.bounds.height)];
-        let larger = sides.iter().all(|(now, first)| (LARGER[0]..LARGER[1]).contains(&(now / first)));
-        let middle = (0..2).all(|k| (at[k] - found.displacement[k] - near[k]).abs() < ASIDE * sides[k].1);
+        let larger = sides.iter().all(|(now, first)| (SIDE_RATIO_RANGE[0]..SIDE_RATIO_RANGE[1]).contains(&(now / first)));
+        let middle = (0..2).all(|k| (at[k] - found.displacement[k] - near[k]).abs() < MAX_CENTER_OFFSET * sides[k].1);
         let bounds = TargetBox { x: found.bounds.x + corner[0], y: found.bounds.y + corner[1], ..found.bounds };
         (larger && middle && changes.moved_with(&found)).then_some(MovingTarget { bounds, ..found })
     }
@@ -58,7 +58,7 @@ impl Changes<'_> {
         }
         let TargetBox { x, y, width, height } = self.outset.bounds;
         [(x, width), (y, height)].into_iter().zip(counts).enumerate().all(|(k, ((from, side), counts))| {
-            let beyond = 0.5 * (LARGER[0] - 1.0) * side;
+            let beyond = 0.5 * (SIDE_RATIO_RANGE[0] - 1.0) * side;
             let fewest = (LINE.0 * self.outset.side()).max(LINE.1) as usize;
             let corner = self.outset.first.corner[k] as f64;
             let mut changed =
@@ -83,6 +83,6 @@ impl Changes<'_> {
                 }
             }
         }
-        strays < STRAYS * count
+        strays < MAX_OUTLIER_SHARE * count
     }
 }

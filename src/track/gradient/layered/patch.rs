@@ -8,7 +8,7 @@ use crate::types::Frame;
 /// Where Gaussians are cut off, standard deviations.
 const TRUNCATE: f64 = 3.0;
 /// Least share of known pixels that a mean rests on.
-const LEAST_SHARE: f64 = 1e-3;
+const MIN_KNOWN_SHARE: f64 = 1e-3;
 
 /// A rectangle of a picture.
 #[derive(Debug, Clone)]
@@ -67,7 +67,7 @@ pub(super) fn smooth_known(frame: &Frame<f64>, sigma: f64) -> Frame<f64> {
     let value = smooth(&frame.map(|v| if v.is_nan() { 0.0 } else { *v }), sigma);
     let share = smooth(&frame.map(|v| if v.is_nan() { 0.0 } else { 1.0 }), sigma);
     let data = value.data().iter().zip(share.data());
-    let data = data.map(|(v, s)| if *s < LEAST_SHARE { f64::NAN } else { v / s }).collect();
+    let data = data.map(|(v, s)| if *s < MIN_KNOWN_SHARE { f64::NAN } else { v / s }).collect();
     Frame::new(frame.width(), frame.height(), data).unwrap_or_default()
 }
 

@@ -10,35 +10,35 @@ use crate::track::gradient::detect::{MovingTarget, detect_moving_target};
 use crate::types::{Frame, TargetBox};
 
 /// Frames in which that may be seen: what turns or grows leaves its box later.
-const SOON: usize = 8;
+const MAX_FRAMES: usize = 8;
 /// Least and greatest displacement along the axis it is greater on, px.
 const MOVED: [f64; 2] = [2.0, 7.0];
 /// The same as measured on what the box holds, which its other content may blur.
 const NEARLY: [f64; 2] = [1.0, 8.0];
 /// How far the middles must be apart: share of the box's side, and px. What moves is known in whole pixels,
 /// and its extent is up to 2 px too long, on either end: its middle is off by 1 px at most.
-const APART: (f64, f64) = (0.1, 1.3);
+const MIN_CENTER_DISTANCE: (f64, f64) = (0.1, 1.3);
 /// The same of the sides' difference.
-const LONGER: (f64, f64) = (0.15, 2.5);
+const MIN_SIDE_DIFFERENCE: (f64, f64) = (0.15, 2.5);
 /// How far what moves may go beyond a box that holds all of it, px.
-const BEYOND: f64 = 1.5;
+const MAX_BEYOND_BOX: f64 = 1.5;
 /// Angle, rad, from which on changes since the first frame no longer determine the outline.
 pub(super) const TURNED: f64 = 0.05;
 /// Sides of what moves over those of the box, at least and at most.
 const SIDES: [f64; 2] = [0.55, 1.6];
 /// Distance of the middles of the two, share of the box's sides.
-const ASIDE: f64 = 0.4;
+const MAX_CENTER_OFFSET: f64 = 0.4;
 /// The same, and px, where the box holds all of what moves: of a target that an object hides in part the box
 /// holds the hidden part, on one side.
 const CENTRED: (f64, f64) = (0.08, 0.75);
 /// Width of the rim around what moved in which it must stand out, px.
 const RIM: f64 = 2.0;
 /// Share of the pixels there that may look like it.
-const ALIKE: f64 = 0.35;
+const MAX_ALIKE_SHARE: f64 = 0.35;
 /// Share of the pixels between the two that may not do as they should.
-const STRAYS: f64 = 0.25;
+const MAX_OUTLIER_SHARE: f64 = 0.25;
 /// Fewest of them.
-const FEWEST: usize = 12;
+const MIN_PIXELS: usize = 12;
 /// The 10th and the 90th percentile of a part's brightness: its usual range.
 const USUAL: [f64; 2] = [0.1, 0.9];
 
@@ -47,7 +47,7 @@ impl InitialSegmentation {
     pub fn refitted(&self, frame: &Frame<f64>, noise: f64) -> Option<MovingTarget> {
         // Where what the box holds determines its displacement, that spares looking in vain.
         let promising = self.moved().is_none_or(|moved| (NEARLY[0]..=NEARLY[1]).contains(&greater(moved)));
-        if self.frames() > SOON || !promising {
+        if self.frames() > MAX_FRAMES || !promising {
             return None;
         }
         let changes = self.changes(frame, noise);
@@ -84,12 +84,12 @@ fn is_another(bounds: &TargetBox, first: &TargetBox) -> bool {
     for k in 0..2 {
         let (side, other) = (held[k][1] - held[k][0], found[k][1] - found[k][0]);
         let aside = (0.5 * (held[k][0] + held[k][1] - found[k][0] - found[k][1])).abs();
-        if !(SIDES[0]..SIDES[1]).contains(&(other / side)) || aside > ASIDE * side {
+        if !(SIDES[0]..SIDES[1]).contains(&(other / side)) || aside > MAX_CENTER_OFFSET * side {
             return false;
         }
-        apart = f64::hypot(apart, aside / (APART.0 * side).max(APART.1));
-        longer |= (side - other).abs() >= (LONGER.0 * side).max(LONGER.1);
-        within &= found[k][0] > held[k][0] - BEYOND && found[k][1] < held[k][1] + BEYOND;
+        apart = f64::hypot(apart, aside / (MIN_CENTER_DISTANCE.0 * side).max(MIN_CENTER_DISTANCE.1));
+        longer |= (side - other).abs() >= (MIN_SIDE_DIFFERENCE.0 * side).max(MIN_SIDE_DIFFERENCE.1);
+        within &= found[k][0] > held[k][0] - MAX_BEYOND_BOX && found[k][1] < held[k][1] + MAX_BEYOND_BOX;
         centred &= aside <= CENTRED.0 * side + CENTRED.1;
     }
     (apart >= 1.0 || longer) && (!within || centred)
@@ -103,7 +103,7 @@ impl Changes<'_> {
         let d = found.displacement.map(|d| d as isize);
         let (outline, core, now) =
             (grown(*first, (0.0, 1.0)), grown(*first, (0.0, -1.0)), grown(found.bounds, (0.0, 1.0)));
-        let usual = self.usual(&core);
+        let usual = self.brightness_range(&core);
         let is_usual = |value: f64| value > usual[0] - self.bar && value < usual[1] + self.bar;
         let rim = grown(*first, (0.0, 1.0 + RIM));
         let (mut counts, mut strays) = ([0; 2], [0; 2]);
@@ -129,12 +129,14 @@ impl Changes<'_> {
                 strays[1] += usize::from(!along || !like && self.at_rest([x, y]) <= self.bar);
             }
         }
-        let stands_out = alike as f64 <= ALIKE * around as f64;
-        stands_out && counts[0] + counts[1] >= FEWEST && (0..2).all(|k| strays[k] as f64 <= STRAYS * counts[k] as f64)
+        let stands_out = alike as f64 <= MAX_ALIKE_SHARE * around as f64;
+        stands_out
+            && counts[0] + counts[1] >= MIN_PIXELS
+            && (0..2).all(|k| strays[k] as f64 <= MAX_OUTLIER_SHARE * counts[k] as f64)
     }
 
     /// Usual range of the brightness in a part of the first frame, grey levels.
-    fn usual(&self, part: &TargetBox) -> [f64; 2] {
+    fn brightness_range(&self, part: &TargetBox) -> [f64; 2] {
         let corner = self.outset.first.corner;
         let (width, height) = self.now.size();
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));

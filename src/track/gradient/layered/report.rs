@@ -5,13 +5,13 @@ use super::state::State;
 use crate::types::{TrackState, TrackStatus};
 
 /// Frames without a measurement after which the target is lost.
-const LOST_AFTER: usize = 15;
+const MAX_MISSED_FRAMES: usize = 15;
 
 pub(super) fn report(tracker: &State, state: &mut TrackState, found: Option<&Finding>, motion: [f64; 2]) {
     (state.status, state.reason) = match found {
         Some(found) if found.occluded => (TrackStatus::Occluded, found.reason),
         Some(found) => (TrackStatus::Tracking, found.reason),
-        None if tracker.history.missed >= LOST_AFTER => (TrackStatus::Lost, "not seen for long"),
+        None if tracker.history.missed >= MAX_MISSED_FRAMES => (TrackStatus::Lost, "not seen for long"),
         None => (TrackStatus::Coasting, "the target is not seen"),
     };
     state.camera_motion = motion;
@@ -61,7 +61,7 @@ pub(super) fn hold_at_border(tracker: &mut State, state: &mut TrackState, (width
     }
     tracker.motion.pose = tracker.placed(tracker.motion.pose, tracker.motion.filter.position());
     report_motion(tracker, state);
-    (state.status, state.reason) = if tracker.history.missed >= LOST_AFTER {
+    (state.status, state.reason) = if tracker.history.missed >= MAX_MISSED_FRAMES {
         (TrackStatus::Lost, "out of the picture for long")
     } else {
         (TrackStatus::Out, "out of the picture")

@@ -6,28 +6,31 @@
 //! What looks like the target goes on beyond its outline then. Where an affine map from the expected pose
 //! explains nearly all of it, that is the pose; from there on similarities are tried again.
 
-use super::finding::{DOUBT, DROP, Finding, LEAK, PRIOR, SURE, WELL, try_at};
+use super::finding::{
+    DOUBTED_INNOVATION, Finding, MAX_ADJACENT_SHARE, MAX_UNDOUBTED_INNOVATION, MIN_VISIBILITY_LOSS,
+    MIN_VISIBILITY_TO_LEARN, PRIOR, try_at,
+};
 use super::state::State;
 use super::task::{MotionModel, VoteMask};
 use crate::types::Frame;
 
 /// Part of the target's area in which its support is not what the picture shows, from which on its outline is
 /// doubted.
-const OFF: f64 = 0.2;
+const MIN_MISMATCH: f64 = 0.2;
 /// Part of the target's area beside it that looks like it, from which on it is taken for the target's own.
-const BEYOND: f64 = 0.03;
+const MIN_ADJACENT_SHARE: f64 = 0.03;
 /// How far that lies on one side, from which on it may be another object, and the map must be where the
 /// target is expected.
-const ASIDE: f64 = 0.5;
+const MIN_ONE_SIDED: f64 = 0.5;
 /// What an affine map may leave of the area that is not explained, share.
-const BETTER: f64 = 0.8;
+const MAX_MISMATCH_RATIO: f64 = 0.8;
 /// Least size over that of the frame before: what shrinks faster is covered.
-const SHRUNK: f64 = 0.95;
+const MIN_SCALE_RATIO: f64 = 0.95;
 
 /// The target under an affine map, where that explains an outline that a similarity, `plain`, does not.
 pub(super) fn locate_reshaped(state: &State, frame: &Frame<f64>, plain: &Finding, levels: &[f64]) -> Option<Finding> {
     let [width, height] = state.target.extent();
-    let doubted = plain.score.mismatch > OFF * width * height && plain.score.leak > BEYOND;
+    let doubted = plain.score.mismatch > MIN_MISMATCH * width * height && plain.score.leak > MIN_ADJACENT_SHARE;
     // Of what comes out again, the rest is hidden still.
     let returns = state.history.missed > 0 || state.history.reappearing > 0;
     if state.motion_model != MotionModel::Similarity || returns || !doubted {
@@ -37,9 +40,11 @@ pub(super) fn locate_reshaped(state: &State, frame: &Frame<f64>, plain: &Finding
     let mut found = try_at(state, frame, &guess, (MotionModel::Affine, VoteMask::None, PRIOR, levels))?;
     // Which way a stretched outline is turned is determined by the similarity, if at all.
     found.aligned.rotation_observable = plain.aligned.rotation_observable;
-    let farthest = if plain.score.one_sided < ASIDE { DOUBT } else { SURE };
-    let expected = found.nis < farthest && found.aligned.pose.scale() > SHRUNK * state.motion.pose.scale();
-    let seen = found.score.visibility >= WELL && found.score.visibility > plain.score.visibility - DROP;
-    let explained = found.score.leak < LEAK && found.score.mismatch < BETTER * plain.score.mismatch;
+    let farthest = if plain.score.one_sided < MIN_ONE_SIDED { DOUBTED_INNOVATION } else { MAX_UNDOUBTED_INNOVATION };
+    let expected = found.nis < farthest && found.aligned.pose.scale() > MIN_SCALE_RATIO * state.motion.pose.scale();
+    let seen = found.score.visibility >= MIN_VISIBILITY_TO_LEARN
+        && found.score.visibility > plain.score.visibility - MIN_VISIBILITY_LOSS;
+    let explained =
+        found.score.leak < MAX_ADJACENT_SHARE && found.score.mismatch < MAX_MISMATCH_RATIO * plain.score.mismatch;
     (expected && seen && explained).then_some(found)
 }

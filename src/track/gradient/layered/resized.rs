@@ -6,10 +6,10 @@
 //! outline be seen; a target of another size fits all around, and leaves nothing of itself beside it.
 
 use super::alignment::Alignment;
-use super::finding::{DROP, Finding, LEVELS, PRIOR, RESIZED, WELL, try_at};
+use super::finding::{Finding, LEVELS, MIN_VISIBILITY_LOSS, MIN_VISIBILITY_TO_LEARN, PRIOR, RESIZED, try_at};
 use super::layers::{CORE, contains, grown};
 use super::pose::Pose;
-use super::samples::CAP;
+use super::samples::MAX_RESIDUAL;
 use super::score::{Score, is_hit, view};
 use super::search::search;
 use super::state::State;
@@ -17,14 +17,14 @@ use super::task::VoteMask;
 use crate::types::{Frame, TargetBox};
 
 /// Frames in a row after which cover is doubted.
-const LONG: usize = 8;
+const MIN_OCCLUDED_FRAMES: usize = 8;
 /// Part of the target's area that may look like it beside it, or be left out of what the size held would
 /// explain: of a target that is really covered there is more.
-const FRINGE: f64 = 0.15;
+const MAX_LEFT_OUT_SHARE: f64 = 0.15;
 /// Sizes that are tried, over the one that is held, in this order.
 const SIZES: [f64; 5] = [0.9, 1.1, 0.8, 1.25, 1.0];
 /// Frames from one of them to the next.
-const EVERY: usize = 2;
+const FRAMES_PER_SIZE: usize = 2;
 /// Farthest from where it is expected, px.
 const REACH: usize = 12;
 /// What a part of the target that is not seen counts as, grey levels.
@@ -33,19 +33,22 @@ const UNSEEN: f64 = 6.0;
 /// The target at another size than the one held, where it is seen well and explains the picture better
 /// than cover does. One size at a time, in turn, which bounds the time of a covered frame.
 pub(super) fn locate_resized(state: &State, frame: &Frame<f64>, covered: &Finding) -> Option<Finding> {
-    if state.history.occluded_frames < LONG || !(state.history.occluded_frames - LONG).is_multiple_of(EVERY) {
+    if state.history.occluded_frames < MIN_OCCLUDED_FRAMES
+        || !(state.history.occluded_frames - MIN_OCCLUDED_FRAMES).is_multiple_of(FRAMES_PER_SIZE)
+    {
         return None;
     }
     let expected = covered.aligned.pose;
-    let size = SIZES[(state.history.occluded_frames - LONG) / EVERY % SIZES.len()];
+    let size = SIZES[(state.history.occluded_frames - MIN_OCCLUDED_FRAMES) / FRAMES_PER_SIZE % SIZES.len()];
     let guess =
         state.placed(Pose { a: expected.a.map(|row| row.map(|a| size * a)), ..expected }, state.position(&expected));
     let place = search(frame, &state.target, &state.background, (&guess, 1.0), REACH)?;
     let found = try_at(state, frame, &place, (state.motion_model, VoteMask::None, PRIOR, &LEVELS[1..]))?;
     let around = grown(state.reached(&expected), (0.2, REACH as f64));
     let [left, before] = [&found, covered].map(|finding| unexplained(state, frame, finding, &around));
-    let taken =
-        left < before && fits(&found.score, &covered.score) && left_over(state, frame, covered, &found) < FRINGE;
+    let taken = left < before
+        && fits(&found.score, &covered.score)
+        && left_over(state, frame, covered, &found) < MAX_LEFT_OUT_SHARE;
     taken.then_some(Finding { reason: RESIZED, ..found })
 }
 
@@ -72,8 +75,8 @@ pub(super) fn unexplained(state: &State, frame: &Frame<f64>, found: &Finding, ar
                 behind
             };
             let seen = frame.get(x, y);
-            let hidden = if found.occluded { (seen - behind).abs() + UNSEEN } else { CAP };
-            sum += (seen - model).abs().min(hidden).min(CAP);
+            let hidden = if found.occluded { (seen - behind).abs() + UNSEEN } else { MAX_RESIDUAL };
+            sum += (seen - model).abs().min(hidden).min(MAX_RESIDUAL);
             count += 1.0;
         }
     }
@@ -104,7 +107,9 @@ pub(super) fn left_over(state: &State, frame: &Frame<f64>, held: &Finding, resiz
 
 /// Whether the target is seen well, better than with cover, and none of it beside the outline.
 fn fits(score: &Score, covered: &Score) -> bool {
-    score.visibility >= WELL && score.visibility > covered.visibility + DROP && score.leak < FRINGE
+    score.visibility >= MIN_VISIBILITY_TO_LEARN
+        && score.visibility > covered.visibility + MIN_VISIBILITY_LOSS
+        && score.leak < MAX_LEFT_OUT_SHARE
 }
 
 /// First pixel of a box that is in the picture, and the one after the last, along both axes.

@@ -1,7 +1,7 @@
 //! Starts again where an object at rest hid part of the target in the first frame: that part is the target's
 //! all the same, but is not known yet, and what hides it is known.
 
-use super::finding::YOUNG;
+use super::finding::SETTLING_FRAMES;
 use super::initial::InitialSegmentation;
 use super::layers::{Background, PRIOR, Target, UNSEEN, grown, holds};
 use super::learn::{CONTINUED, SOLID};
@@ -9,18 +9,18 @@ use super::occluder::{HiddenPart, find_occluder};
 use super::patch::{dilated, smooth_known};
 use super::pose::Pose;
 use super::refit::TURNED;
-use super::state::{ADAPTED, State, start_filter};
+use super::state::{MAX_SETTLING_FRAMES, State, start_filter};
 use crate::track::gradient::detect::MovingTarget;
 use crate::types::{Frame, TargetBox};
 
 /// Variance of the displacement since the first frame, which is in whole pixels, px^2.
-const WHOLE_PIXELS: f64 = 0.5;
+const WHOLE_PIXEL_VARIANCE: f64 = 0.5;
 /// Difference of displacements that whole pixels, and what is behind the target, may make, px.
-const WHOLE: f64 = 2.0;
+const WHOLE_PIXEL_TOLERANCE: f64 = 2.0;
 /// Deviation of the middle of what moved, whose sides are known to a pixel, px.
-const UNSETTLED: f64 = 0.6;
+const CENTER_STD: f64 = 0.6;
 /// Change in still places that noise does not make, over the noise.
-const STILL: f64 = 4.0;
+const STILL_CHANGE_PER_NOISE: f64 = 4.0;
 
 /// Looks whether the frame decides what the first box held.
 pub(super) fn resolve_initial(state: &mut State, frame: &Frame<f64>, motion: [f64; 2]) {
@@ -61,9 +61,9 @@ pub(super) fn restart_occluded(
         };
         found.hidden.get(pixel(at[0] + xi[0], x0, width), pixel(at[1] + xi[1], y0, height))
     });
-    state.background.begin_anew(outset, found, frame, STILL * state.scene.noise);
+    state.background.begin_anew(outset, found, frame, STILL_CHANGE_PER_NOISE * state.scene.noise);
     restart_at(state, [at[0] + found.moved[0], at[1] + found.moved[1]], found.moved, found.frames);
-    (state.history.occluded, state.history.age, state.history.adapts_until) = (true, YOUNG, 0);
+    (state.history.occluded, state.history.age, state.history.adapts_until) = (true, SETTLING_FRAMES, 0);
 }
 
 /// The first box was not that of what moves.
@@ -73,7 +73,7 @@ pub(super) fn restart_with_box(state: &mut State, found: &MovingTarget, frame: &
     let turned = state.motion.rotation;
     restart_at(state, found.bounds.centre(), found.displacement, frames);
     state.motion.rotation = turned;
-    state.uncertainty.outline = [UNSETTLED; 2];
+    state.uncertainty.outline = [CENTER_STD; 2];
 }
 
 /// Begins at a place that was reached in so many frames, by a displacement in whole pixels.
@@ -82,13 +82,13 @@ pub(super) fn restart_at(state: &mut State, centre: [f64; 2], moved: [f64; 2], f
     state.motion.filter = start_filter(centre);
     for (k, (x, p)) in state.motion.filter.x.iter_mut().zip(&mut state.motion.filter.p).enumerate() {
         x[1] = moved[k] / frames as f64;
-        (p[(0, 0)], p[(1, 1)]) = (WHOLE_PIXELS, 1.0);
+        (p[(0, 0)], p[(1, 1)]) = (WHOLE_PIXEL_VARIANCE, 1.0);
     }
     (state.motion.last_position, state.history.mean_visibility) = (None, 1.0);
     (state.history.missed, state.history.occluded, state.history.age, state.history.max_visibility) =
         (0, false, 0, 0.0);
     (state.motion.rotation, state.history.look_alike_cooldown) = (0.0, 0);
-    (state.last_good, state.history.adapts_until) = (None, ADAPTED);
+    (state.last_good, state.history.adapts_until) = (None, MAX_SETTLING_FRAMES);
 }
 
 /// As long as the first box is undecided, what is reported of the way since then may
@@ -101,7 +101,7 @@ pub(super) fn update_displacement_uncertainty(state: &mut State) {
     let grown = (state.motion.pose.scale() - 1.0).abs();
     state.uncertainty.displacement = [0, 1].map(|k| {
         let apart = (at[k] - first[k] - moved[k]).abs();
-        if crate::ablation::keeps("gradient.start_doubt") && apart > WHOLE + 0.5 * grown * size[k] {
+        if crate::ablation::keeps("gradient.start_doubt") && apart > WHOLE_PIXEL_TOLERANCE + 0.5 * grown * size[k] {
             apart
         } else {
             0.0

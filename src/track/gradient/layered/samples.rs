@@ -6,21 +6,21 @@ use crate::math::robust_std;
 use crate::types::{Frame, TargetBox};
 
 /// Steps at a level.
-const STEPS: usize = 8;
+const MAX_STEPS: usize = 8;
 /// A level is left when a step is shorter, reduced px.
-const SETTLED: f64 = 0.005;
+const MIN_STEP: f64 = 0.005;
 /// By how much the capped residual must fall.
-pub(super) const LESS: f64 = 0.9;
+pub(super) const MAX_RESIDUAL_RATIO: f64 = 0.9;
 /// Every which of them the deviation of the residuals is measured on.
 const EVERY: usize = 4;
 /// Residual that all larger ones count as, grey levels.
-pub(super) const CAP: f64 = 25.0;
+pub(super) const MAX_RESIDUAL: f64 = 25.0;
 /// Smallest information of a step, grey^2/px^2 per pixel.
-const LEAST_INFORMATION: f64 = 0.05;
+const MIN_INFORMATION: f64 = 0.05;
 /// Around the target nothing is used, px.
-pub(super) const AROUND: f64 = 14.0;
+pub(super) const SCENE_MARGIN: f64 = 14.0;
 /// Motions nearer to each other than this lead to the same, px.
-pub(super) const SAME: f64 = 0.5;
+pub(super) const SAME_MOTION: f64 = 0.5;
 /// Pixels that the scatter is measured on, at most.
 pub(super) const SCATTER_SAMPLES: usize = 1024;
 /// Pixels used at a level, at most.
@@ -88,20 +88,20 @@ impl Samples {
 
     /// Whether a motion explains the next frame clearly better than none.
     pub fn explain(&self, next: &Frame<f64>, motion: [f64; 2]) -> bool {
-        self.capped(next, motion) < LESS * self.capped(next, [0.0; 2])
+        self.capped(next, motion) < MAX_RESIDUAL_RATIO * self.capped(next, [0.0; 2])
     }
 
     /// Mean residual, large ones counting alike.
     pub fn capped(&self, next: &Frame<f64>, motion: [f64; 2]) -> f64 {
         let residuals = self.residuals(next, motion);
-        let sizes = residuals.iter().map(|r| r.abs().min(CAP)).filter(|r| !r.is_nan());
+        let sizes = residuals.iter().map(|r| r.abs().min(MAX_RESIDUAL)).filter(|r| !r.is_nan());
         let (sum, count) = sizes.fold((0.0, 0usize), |(sum, count), size| (sum + size, count + 1));
         sum / count.max(1) as f64
     }
 
     /// Gradient steps on all samples (5); `None` where the scene has no texture.
     pub fn refine(&self, next: &Frame<f64>, mut motion: [f64; 2], noise: f64) -> Option<[f64; 2]> {
-        for _ in 0..STEPS {
+        for _ in 0..MAX_STEPS {
             let residuals = self.residuals(next, motion);
             let s = residual_std(&residuals).max(noise);
             let (mut sums, mut count) = ([0.0; 5], 0.0);
@@ -118,13 +118,13 @@ impl Samples {
             }
             let [xx, xy, yy, xr, yr] = sums;
             let determinant = xx * yy - xy * xy;
-            let least = (LEAST_INFORMATION * count).powi(2);
+            let least = (MIN_INFORMATION * count).powi(2);
             if determinant.is_nan() || determinant <= least {
                 return None;
             }
             let step = [-(yy * xr - xy * yr) / determinant, -(xx * yr - xy * xr) / determinant];
             motion = [motion[0] + step[0], motion[1] + step[1]];
-            if step[0].hypot(step[1]) < SETTLED {
+            if step[0].hypot(step[1]) < MIN_STEP {
                 break;
             }
         }

@@ -5,8 +5,8 @@ use super::camera::{FramePyramid, camera_motion, scatter};
 use super::layers::grown;
 use super::learn;
 use super::light::Light;
-use super::samples::{AROUND, SCATTER_SAMPLES, spread};
-use super::state::{LEAST_NOISE, State};
+use super::samples::{SCATTER_SAMPLES, SCENE_MARGIN, spread};
+use super::state::{MIN_NOISE, State};
 use crate::math::robust_std;
 use crate::track::gradient::noise::median;
 use crate::track::gradient::options::CameraMotion;
@@ -14,12 +14,12 @@ use crate::types::{Frame, TargetBox};
 
 /// Scatter of what changes in the still scene beyond which a frame is wild: so many times the noise, and grey
 /// levels.
-const OUTLYING: (f64, f64) = (6.0, 8.0);
+const MAX_SCATTER: (f64, f64) = (6.0, 8.0);
 /// Frames in a row that are passed over for that.
-const WILD_FOR: usize = 10;
+const MAX_WILD_FRAMES: usize = 10;
 
 /// Contrast of the scene over that of the frame before, from which on down it is gone.
-const GONE: f64 = 0.25;
+const MAX_CONTRAST_RATIO: f64 = 0.25;
 
 /// Whether nothing of the scene is left in a frame before anything was measured: black, or another even
 /// picture. What noise there is, is learnt from the first pair, and would be all that such a frame
@@ -35,7 +35,7 @@ pub(super) fn is_blank(state: &State, frame: &Frame<f64>) -> bool {
     }
     let hidden = state.reached(&state.motion.pose);
     let [before, now] = [&state.scene.previous.frame, frame].map(|frame| contrast(frame, hidden));
-    now < GONE * before && before > LEAST_NOISE && state.scene.gap <= WILD_FOR
+    now < MAX_CONTRAST_RATIO * before && before > MIN_NOISE && state.scene.gap <= MAX_WILD_FRAMES
 }
 
 /// How far the scene moved since the last frame that could be used.
@@ -55,10 +55,10 @@ pub(super) fn is_wild(state: &mut State, frame: &Frame<f64>, bounds: TargetBox, 
         return false;
     }
     let changed = scatter(&state.scene.previous.frame, frame, bounds, motion);
-    if changed <= OUTLYING.0 * state.scene.noise + OUTLYING.1 {
+    if changed <= MAX_SCATTER.0 * state.scene.noise + MAX_SCATTER.1 {
         return false;
     }
-    let lasts = state.scene.gap > WILD_FOR;
+    let lasts = state.scene.gap > MAX_WILD_FRAMES;
     if lasts {
         // Differences have the noise of two frames.
         state.scene.noise = state.scene.noise.max(changed / std::f64::consts::SQRT_2);
@@ -100,7 +100,7 @@ pub(super) fn shift(state: &mut State, motion: [f64; 2]) {
 
 /// Contrast of the still scene, grey levels: the deviation of its brightness from the median, robustly.
 fn contrast(frame: &Frame<f64>, target: TargetBox) -> f64 {
-    let hidden = grown(target, (0.0, AROUND));
+    let hidden = grown(target, (0.0, SCENE_MARGIN));
     let mut off: Vec<f64> = spread(frame.size(), hidden, SCATTER_SAMPLES).map(|(x, y)| frame.get(x, y)).collect();
     let middle = median(&mut off);
     for value in &mut off {

@@ -6,13 +6,13 @@ use crate::image::cubic_at;
 use crate::types::Frame;
 
 /// Difference beyond which brightness is simply different, grey levels.
-const CAP: f64 = 30.0;
+const MAX_DIFFERENCE: f64 = 30.0;
 /// Weight of the difference from the background.
 const LIKE_BEHIND: f64 = 0.5;
 /// Least share of the target's points that must be in the picture.
-const LEAST_SHARE: f64 = 0.4;
+const MIN_SHARE_IN_PICTURE: f64 = 0.4;
 /// Most points that are compared at each place.
-const POINTS: usize = 400;
+const MAX_POINTS: usize = 400;
 
 /// The pose within `reach` px whose picture is most like the target and least like the background: least
 /// `mean(min(|E - g T|, 30)) - 0.5 mean(min(|E - Bg|, 30))`. Places are given up as soon as they cannot be
@@ -28,7 +28,7 @@ pub(super) fn search(
         .flat_map(|j| (0..target.a.width()).map(move |i| (i, j)))
         .filter(|(i, j)| target.a.get(*i, *j) > CORE)
         .collect();
-    let every = core.len().div_ceil(POINTS).max(1);
+    let every = core.len().div_ceil(MAX_POINTS).max(1);
     let points: Vec<_> =
         core.iter().step_by(every).map(|&(i, j)| (guess.turn(target.xi(i, j)), gain * target.t.get(i, j))).collect();
     let reach = reach as isize;
@@ -59,7 +59,7 @@ fn cost(
     (p, least): ([f64; 2], f64),
 ) -> Option<f64> {
     let (mut own, mut behind, mut count, mut known) = (0.0, 0.0, 0, 0);
-    let too_much = (least + LIKE_BEHIND * CAP) * points.len() as f64;
+    let too_much = (least + LIKE_BEHIND * MAX_DIFFERENCE) * points.len() as f64;
     for (offset, bright) in points {
         let place = [p[0] + offset[0], p[1] + offset[1]];
         if !is_inside(place, frame) {
@@ -67,17 +67,17 @@ fn cost(
         }
         // Points of an upright target of the first size lie on pixels.
         let seen = nearest(frame, place);
-        own += (seen - bright).abs().min(CAP);
+        own += (seen - bright).abs().min(MAX_DIFFERENCE);
         count += 1;
         if own > too_much {
             return None;
         }
         if background.is_known(place) {
-            behind += (seen - nearest(&background.picture, place)).abs().min(CAP);
+            behind += (seen - nearest(&background.picture, place)).abs().min(MAX_DIFFERENCE);
             known += 1;
         }
     }
-    if (count as f64) < LEAST_SHARE * points.len() as f64 || count == 0 {
+    if (count as f64) < MIN_SHARE_IN_PICTURE * points.len() as f64 || count == 0 {
         return None;
     }
     Some(own / count as f64 - LIKE_BEHIND * if known > 0 { behind / known as f64 } else { 0.0 })

@@ -19,11 +19,11 @@ const OUTLINE: f64 = 0.07;
 /// noisy frames stays wrong for as long as it is remembered.
 const OUTLINE_IN_NOISE: f64 = 1.4;
 /// Frames after which it is done with that, in any case.
-pub(super) const ADAPTED: usize = 20;
+pub(super) const MAX_SETTLING_FRAMES: usize = 20;
 /// Change of size from one frame to the next that a look-alike makes, or cover.
-pub(super) const GROWN: f64 = 0.04;
+pub(super) const MIN_SCALE_CHANGE: f64 = 0.04;
 /// Least noise, grey levels.
-pub(super) const LEAST_NOISE: f64 = 1.5;
+pub(super) const MIN_NOISE: f64 = 1.5;
 
 /// One target.
 #[derive(Debug)]
@@ -146,14 +146,14 @@ impl State {
             },
             scene: Scene {
                 previous: FramePyramid::new(frame),
-                noise: LEAST_NOISE,
+                noise: MIN_NOISE,
                 camera_velocity: [0.0; 2],
                 gap: 0,
                 buffer: Vec::new(),
             },
             history: History {
                 age: 0,
-                adapts_until: ADAPTED,
+                adapts_until: MAX_SETTLING_FRAMES,
                 mean_visibility: 1.0,
                 max_visibility: 0.0,
                 missed: 0,
@@ -221,7 +221,7 @@ impl State {
 
     /// Whether the target is smaller than in the frame before by what cover makes of it.
     pub fn has_shrunk(&self, pose: &Pose) -> bool {
-        pose.scale() < (1.0 - GROWN) * self.motion.pose.scale()
+        pose.scale() < (1.0 - MIN_SCALE_CHANGE) * self.motion.pose.scale()
     }
 
     /// Whether the support is still adapting to what the box holds: a target of which much was never seen had

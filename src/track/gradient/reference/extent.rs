@@ -8,11 +8,11 @@
 use super::local_flow::LocalFlow;
 
 /// Share of the moving pixels beyond either end: few of them are not the target's.
-const BEYOND: f64 = 0.05;
+const SHARE_BEYOND_ENDS: f64 = 0.05;
 /// How fast the usual distance of the ends follows.
 const RATE: f64 = 0.1;
 /// Ends that are farther apart than so many times the usual distance are not the target's alone.
-const ALIKE: f64 = 1.35;
+const MAX_EXTENT_RATIO: f64 = 1.35;
 /// Share of the usual distance that may be missing where both ends are seen.
 const SLACK: f64 = 0.1;
 /// Local flow says nothing so near to the border of the picture, px.
@@ -31,7 +31,9 @@ pub(super) fn ends(flow: &LocalFlow, eps: f64) -> Option<Ends> {
         counts[1][at / width] += 1.0;
     }
     let all: f64 = counts[0].iter().sum();
-    (all > 0.0).then(|| counts.map(|counts| [BEYOND, 1.0 - BEYOND].map(|share| quantile(&counts, share * all))))
+    (all > 0.0).then(|| {
+        counts.map(|counts| [SHARE_BEYOND_ENDS, 1.0 - SHARE_BEYOND_ENDS].map(|share| quantile(&counts, share * all)))
+    })
 }
 
 /// Place up to which so many lie, where each pixel's are spread evenly over it.
@@ -67,7 +69,7 @@ impl Extent {
     }
 
     /// How far apart the ends usually are along x and y, px.
-    pub fn usual(&self) -> [f64; 2] {
+    pub fn mean_extent(&self) -> [f64; 2] {
         self.usual
     }
 
@@ -76,7 +78,7 @@ impl Extent {
     pub fn middle(&self, ends: &Ends, expected: [f64; 2], lengths: [f64; 2]) -> [Option<Middle>; 2] {
         std::array::from_fn(|k| {
             let ([low, high], usual) = (ends[k], self.usual[k]);
-            if high - low > ALIKE * usual {
+            if high - low > MAX_EXTENT_RATIO * usual {
                 return None;
             }
             let missing = 1.0 - (high - low) / usual;
@@ -102,7 +104,7 @@ impl Extent {
     pub fn learn(&mut self, ends: &Ends) {
         for (usual, [low, high]) in self.usual.iter_mut().zip(ends) {
             let apart = high - low;
-            if apart < ALIKE * *usual {
+            if apart < MAX_EXTENT_RATIO * *usual {
                 *usual += RATE * (apart - *usual);
             }
         }

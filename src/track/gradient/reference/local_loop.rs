@@ -18,16 +18,16 @@ use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 /// Pixels around the window that masks need.
 const MARGIN: usize = 6;
 /// Fewest moving pixels that a target is.
-const FEWEST: usize = 12;
+const MIN_MOVING_PIXELS: usize = 12;
 /// Largest innovation squared that is taken for one of the target, four degrees of freedom.
-const GATE: f64 = 16.0;
+const MAX_INNOVATION: f64 = 16.0;
 /// Refusals in a row after which a measurement is taken all the same.
-const REFUSALS: usize = 3;
+const MAX_REFUSALS: usize = 3;
 /// Variance of the position and velocity of what is too fast for local flow, px^2: whole pixels, an outline
 /// of changed ones.
 const FAST: f64 = 1.0;
 /// Its sides differ from the target's by less than this factor.
-const ALIKE: f64 = 1.6;
+const MAX_SIDE_RATIO: f64 = 1.6;
 /// How fast the usual count of moving pixels follows a larger one, and a smaller one: parts are hidden more
 /// often than they grow.
 const USUAL: [f64; 2] = [0.1, 0.03];
@@ -37,13 +37,13 @@ const WHOLE: f64 = 0.85;
 /// that hides it stands still.
 const SLIP: f64 = 2.0;
 /// Least speed for that, px/frame.
-const LEAST_SPEED: f64 = 1.0;
+const MIN_SLIP_SPEED: f64 = 1.0;
 /// Share of the usual count below which what is left of a target is about to be hidden, and not to stop.
 const HIDDEN: f64 = 0.6;
 /// Share of the usual count that is missing where what is left shows nothing of the target's ends.
-const HARDLY: f64 = 0.6;
+const MAX_MISSING_SHARE: f64 = 0.6;
 /// Frames without motion after which the target counts as lost.
-const LOST_AFTER: usize = 15;
+const MAX_MISSED_FRAMES: usize = 15;
 /// Least automatic `min_speed`, px/frame.
 const MIN_SPEED: f64 = 0.3;
 
@@ -141,13 +141,13 @@ impl LocalLoop {
         let (found, ends) = (told.map(|told| told.mean), told.and_then(|told| told.ends));
         self.flow_count = found.map_or(0, |mean| mean.count);
         let all_moves = told.is_some_and(|told| told.all_moves);
-        let was_lost = self.missed >= LOST_AFTER;
+        let was_lost = self.missed >= MAX_MISSED_FRAMES;
         self.filter.predict();
         let (mut innovation, mut measured) = (f64::NAN, false);
         match &found {
             // The mean of what moves is not the target's.
             Some(_) if all_moves => {}
-            Some(mean) if mean.count >= if self.rules.careful { FEWEST } else { 1 } => {
+            Some(mean) if mean.count >= if self.rules.careful { MIN_MOVING_PIXELS } else { 1 } => {
                 let missing = if self.rules.careful { 1.0 - self.share(mean.count) } else { 0.0 };
                 let (place, lean) = self.place(mean, ends.as_ref(), missing);
                 let slip = self.slip(missing);
@@ -157,10 +157,11 @@ impl LocalLoop {
                     velocity: Some((mean.velocity, slip.map(|slip| r_vel + slip * slip))),
                 };
                 innovation = self.filter.innovation(&z);
-                let fast = second.as_ref().filter(|_| self.rules.careful && innovation >= GATE);
+                let fast = second.as_ref().filter(|_| self.rules.careful && innovation >= MAX_INNOVATION);
                 let fast = fast.and_then(|second| self.too_fast(second));
                 z = fast.unwrap_or(z);
-                if !self.rules.careful || innovation < GATE || fast.is_some() || self.refused >= REFUSALS {
+                if !self.rules.careful || innovation < MAX_INNOVATION || fast.is_some() || self.refused >= MAX_REFUSALS
+                {
                     self.filter.update(&z);
                     (self.refused, measured) = (0, true);
                     self.count(mean.count);
@@ -200,7 +201,7 @@ impl LocalLoop {
         let Some(ends) = ends else { return (of_mean, self.size.map(|length| missing * length)) };
         let between = self.extent.middle(ends, self.filter.position(), self.lengths);
         // Of what shows little the ends are anything's.
-        let hardly = if missing > HARDLY { missing } else { 0.0 };
+        let hardly = if missing > MAX_MISSING_SHARE { missing } else { 0.0 };
         let lean = |k: usize| self.size[k] * between[k].map_or(missing, |middle| middle.missing.max(hardly));
         ([0, 1].map(|k| between[k].map_or(of_mean[k], |middle| middle.at)), [0, 1].map(lean))
     }
@@ -208,7 +209,7 @@ impl LocalLoop {
     /// Deviations of the mean flow from the target's along x and y, px/frame, where a share of what usually
     /// moves is `missing`.
     fn slip(&self, missing: f64) -> [f64; 2] {
-        self.filter.speed().map(|speed| SLIP * missing * speed.abs().max(LEAST_SPEED))
+        self.filter.speed().map(|speed| SLIP * missing * speed.abs().max(MIN_SLIP_SPEED))
     }
 
     /// Share of the target that moves, by the usual count.
@@ -231,7 +232,7 @@ impl LocalLoop {
         let near = [0, 1].map(|k| expected[k] - corner[k]);
         let found = detect_moving_target(&self.before, second, Some(near))?;
         let unlike = (0..2).any(|k| (found.displacement[k] - speed[k]).abs() > self.rules.flow.step_max);
-        let alike = |found: f64, known: f64| (found / known).max(known / found) < ALIKE;
+        let alike = |found: f64, known: f64| (found / known).max(known / found) < MAX_SIDE_RATIO;
         let same = alike(found.bounds.width, self.size[0]) && alike(found.bounds.height, self.size[1]);
         let centre = found.bounds.centre();
         (unlike && same).then(|| Measurement {
@@ -316,13 +317,13 @@ impl LocalLoop {
             moving += usize::from(w[0].abs() >= min_speed || w[1].abs() >= min_speed);
             all += 1;
         }
-        2 * moving > all && moving > FEWEST && moving as f64 > ALL * mean.count as f64
+        2 * moving > all && moving > MIN_MOVING_PIXELS && moving as f64 > ALL * mean.count as f64
     }
 
     /// Accepted flow outside the target, as far off that no window of local flow sees any of it.
     fn around(&self, flow: &LocalFlow) -> impl Iterator<Item = [f64; 2]> {
         let (corner, centre, speed) = (self.corner(), self.filter.position(), self.filter.speed());
-        let usual = self.extent.usual();
+        let usual = self.extent.mean_extent();
         let reach = [0, 1].map(|k| self.size[k].max(usual[k]) / 2.0 + MARGIN as f64 + speed[k].abs());
         let width = flow.flow.width();
         let outside = move |at: usize| {
@@ -353,9 +354,9 @@ impl LocalLoop {
     ) {
         (state.status, state.reason) = match (measured, found) {
             (true, _) => (TrackStatus::Tracking, ""),
-            _ if self.missed >= LOST_AFTER => (TrackStatus::Lost, "nothing that moves like the target for long"),
+            _ if self.missed >= MAX_MISSED_FRAMES => (TrackStatus::Lost, "nothing that moves like the target for long"),
             (_, None) => (TrackStatus::Coasting, "the frame cannot be used"),
-            (_, Some(mean)) if mean.count < FEWEST => (TrackStatus::Coasting, "nothing moves"),
+            (_, Some(mean)) if mean.count < MIN_MOVING_PIXELS => (TrackStatus::Coasting, "nothing moves"),
             _ => (TrackStatus::Coasting, "what moves is not where the target should be"),
         };
         state.reacquired = measured && was_lost;
