@@ -36,7 +36,9 @@ use crate::jet::{Neighbourhood, TimeScheme};
 /// The time scheme of two frames.
 pub const PAIR: &str = "pair";
 
-/// One method: its name, the options that it takes besides those of all methods, and what it can do.
+/// One method: its name, the options that it takes in addition to those of all methods, and what it can do.
+// A table of capabilities: each is a question of its own.
+#[allow(clippy::struct_excessive_bools)]
 #[derive(Debug, Clone, Copy)]
 pub struct MethodInfo {
     /// The name in Rust and Python; `-` for `_` on the command line.

@@ -120,7 +120,7 @@ impl AnyFlowFilter {
     ///
     /// # Errors
     /// Those of [`SamplingGrid::shape`](crate::types::SamplingGrid::shape).
-    pub fn means(&self) -> Result<Option<((usize, usize), Vec<f64>)>> {
+    pub fn means(&self) -> Result<Option<SiteValues>> {
         each!(&self.filter, filter => {
             let values = (0..filter.len()).flat_map(|site| filter.state(site).map_or([f64::NAN; 12], |(mean, _)| mean));
             Ok(Some((filter.options().sites.shape(filter.frame_size())?, values.collect())))
@@ -131,7 +131,7 @@ impl AnyFlowFilter {
     ///
     /// # Errors
     /// As [`means`](Self::means).
-    pub fn covariances(&self) -> Result<Option<((usize, usize), Vec<f64>)>> {
+    pub fn covariances(&self) -> Result<Option<SiteValues>> {
         each!(&self.filter, filter => {
             let none = [[f64::NAN; 12]; 12];
             let sites = (0..filter.len()).flat_map(|site| filter.state(site).map_or(none, |(_, covariance)| covariance));

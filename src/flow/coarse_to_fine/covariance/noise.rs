@@ -119,7 +119,7 @@ pub(super) struct Noise<'a, T> {
     energy: Energy,
     excess: f64,
     /// Information, in any direction, that white noise contributes, over its residual energy.
-    noise_information: f64,
+    white_information: f64,
     support: &'a DataSupport,
 }
 
@@ -135,7 +135,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
             statistics,
             energy,
             excess: excess(statistics, data),
-            noise_information: if is_pair { PAIR_NOISE_INFORMATION } else { TRIPLE_NOISE_INFORMATION },
+            white_information: if is_pair { PAIR_NOISE_INFORMATION } else { TRIPLE_NOISE_INFORMATION },
             support,
         }
     }
@@ -163,7 +163,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         };
         let information = mean_information(data, around(x, data.width), around(y, data.height));
         let energy = self.energy(x, y);
-        let [a, b, c] = inverse_without_noise(information, self.noise_information * energy);
+        let [a, b, c] = inverse_without_noise(information, self.white_information * energy);
         let best = 0.5 * (a + c) - (0.5 * (a - c)).hypot(b);
         self.excess * energy * best <= MAX_TEXTURED_DENSITY
     }
@@ -173,7 +173,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
     pub fn unconstrained(&self, [a, b, c]: [f64; 3], x: usize, y: usize) -> UnconstrainedDirections {
         let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
         let radius = half.hypot(b);
-        let beyond = |share: f64| (self.noise_information + share) * self.energy(x, y);
+        let beyond = |share: f64| (self.white_information + share) * self.energy(x, y);
         if middle - radius >= beyond(MIN_CONSTRAINING_INFORMATION) {
             return NONE;
         }
@@ -190,7 +190,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         let energy = self.energy(x, y);
         let inverse = inverse_without_noise(
             positive_definite(self.statistics.information(x, y)),
-            self.noise_information * energy,
+            self.white_information * energy,
         );
         let scale = self.excess * energy;
         let (flow_share, slope_share) = (of_white_noise(1), of_white_noise(2));

@@ -145,7 +145,7 @@ pub(super) fn settle_outline(state: &mut State, before: [f64; 2]) {
     let after = state.position(&state.motion.pose);
     for (k, unsettled) in state.uncertainty.outline.iter_mut().enumerate() {
         let moved = ((after[k] - before[k]).abs() - SETTLED).max(0.0);
-        *unsettled = if !crate::ablation::keeps("gradient.unsettled") { 0.0 } else { 1.0 }
+        *unsettled = if crate::ablation::keeps("gradient.unsettled") { 1.0 } else { 0.0 }
             * (SETTLING.1 * *unsettled).max(SETTLING.0 * moved);
     }
 }
