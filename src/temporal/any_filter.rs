@@ -10,6 +10,9 @@ use crate::types::{AnyField, AnyFrame, FlowField, Precision, Sample};
 use std::io::{Cursor, Read, Seek};
 use std::path::Path;
 
+/// Width and height of a field, and the values of its sites one after the other.
+pub type SiteValues = ((usize, usize), Vec<f64>);
+
 /// Filters frames of any sample type, prepared first.
 #[derive(Debug)]
 pub struct AnyFlowFilter {
