@@ -223,7 +223,7 @@ mod tests {
         let mut named = vec![false; 2 * MAX_SERIAL];
         let own = |name: &str| name.starts_with("jacoflow-");
         for_each_band(&mut named, MAX_SERIAL / 16, |_, _, band| {
-            band.fill(std::thread::current().name().is_some_and(own))
+            band.fill(std::thread::current().name().is_some_and(own));
         });
         assert!(named.iter().all(|&named| named));
     }

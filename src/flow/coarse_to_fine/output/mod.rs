@@ -74,7 +74,7 @@ pub(super) fn fill<T: SimdReal>(
     bands(field).into_par_iter().for_each(|mut band| match &sites {
         SamplingGrid::Points(points) => writer.points(points, &mut band),
         SamplingGrid::Grid { .. } => {
-            dispatch(writer.simd, Rows { writer: &writer, sites: &sites, width, band: &mut band })
+            dispatch(writer.simd, Rows { writer: &writer, sites: &sites, width, band: &mut band });
         }
     });
     moved.into_iter().chain(full).for_each(|planes| space.keep(planes));

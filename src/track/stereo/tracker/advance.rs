@@ -111,8 +111,8 @@ impl StereoTracker {
         // A component of leftovers may be anywhere: it needs no new track.
         let left_over = |k: usize| match (&last, &self.posterior, &posterior) {
             (Some(last), Some(before), Some(now)) if crate::ablation::keeps("stereo.left_over") => {
-                self.is_left_over(&last.clusters, before, k)
-                    && self.is_left_over(&clusters, now, k)
+                left_over_in(&last.clusters, before, k)
+                    && left_over_in(&clusters, now, k)
                     && clusters.pixels[k].len() <= 2 * last.clusters.pixels[k].len()
             }
             _ => false,
@@ -156,9 +156,10 @@ impl StereoTracker {
         let affine = motion.affine_at(self.graph.node(self.time.checked_sub(1)?, k)?.middle);
         Some(Departure { motion: [affine[0], affine[1], motion.depth], affine: Some(affine) })
     }
+}
 
-    fn is_left_over(&self, clusters: &Clusters, posterior: &Posterior, k: usize) -> bool {
-        let pixels = clusters.pixels.get(k).map_or(0.0, |pixels| pixels.len() as f64);
-        k < posterior.components() && is_left_over(posterior, k, (pixels, clusters.points.len() as f64))
-    }
+/// Whether component `k` of a step explains too few of its pixels to count.
+fn left_over_in(clusters: &Clusters, posterior: &Posterior, k: usize) -> bool {
+    let pixels = clusters.pixels.get(k).map_or(0.0, |pixels| pixels.len() as f64);
+    k < posterior.components() && is_left_over(posterior, k, (pixels, clusters.points.len() as f64))
 }
