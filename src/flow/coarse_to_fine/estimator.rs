@@ -97,7 +97,7 @@ fn estimate<T: SimdReal>(
     workspace: &mut Workspace<T>,
 ) -> Estimate<T> {
     let simd = plan.simd;
-    let mut found = plan.descend(workspace);
+    let mut found = plan.estimate_all_levels(workspace);
     let (mut motion, mut statistics) =
         refine(simd, &workspace.space, &RefineOptions::default(), &found.motion, &found.data);
     if is_triple {

@@ -45,7 +45,7 @@ pub(super) struct DescentResult<T> {
 
 impl DescentPlan {
     /// Descends from the coarsest level of the filled pyramid, starting without motion.
-    pub fn descend<T: SimdReal>(&self, workspace: &mut Workspace<T>) -> DescentResult<T> {
+    pub fn estimate_all_levels<T: SimdReal>(&self, workspace: &mut Workspace<T>) -> DescentResult<T> {
         let levels = workspace.pyramid.levels();
         let coarsest = levels.len() - 1;
         let site_counts = site_counts(levels[coarsest].size);
