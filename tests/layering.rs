@@ -81,7 +81,7 @@ fn paths(code: &str) -> Vec<Vec<String>> {
         }
     }
     for (at, word) in code.match_indices("use ") {
-        if code[..at].chars().next_back().is_none_or(|c| c.is_whitespace()) {
+        if code[..at].chars().next_back().is_none_or(char::is_whitespace) {
             let rest = &code[at + word.len()..];
             if !["crate::", "super::", "self::"].iter().any(|start| rest.starts_with(start)) {
                 expand(rest, &mut Vec::new(), &mut found);

@@ -125,8 +125,8 @@ impl Window {
     /// Compares with the window around `centre` of the second frame. Returns the means of slope times
     /// difference along x and y.
     ///
-    /// The difference is first frame minus second frame, so that [`StructureTensor::solve`] makes it the step to take
-    /// from `centre`.
+    /// The difference is first frame minus second frame, so that [`StructureTensor::solve`] makes it the step
+    /// to take from `centre`.
     #[inline(always)]
     pub fn compare<V: Lanes<Scalar = f32>>(&mut self, frame: &Frame<f32>, centre: [f64; 2]) -> [f64; 2] {
         let zero = V::zero();

@@ -9,7 +9,7 @@
 //! times its Laplacian.
 
 use super::estimate::Strip;
-use super::noise::columns;
+use super::jet_matrix::columns;
 use super::tile::{JetTile, Planes, Source, padded};
 use super::truncation::{DERIVATIVES, DIFFERENCED, MIXED, Truncation, residual};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};

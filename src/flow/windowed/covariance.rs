@@ -20,10 +20,10 @@
 //! covariance is that of the whole error.
 //!
 //! Unless the noise is given, its variance is read from the highest frequencies of the frames
-//! ([`super::high_frequencies`]), where motion and misfit hardly show. The residual gives another, its sum of squares
-//! over its expectation `c0 sum w - tr(N^-1 S)`, which misfit can only raise: so the variance is never more
-//! than what chance allows beyond that, and where the residual is that much larger than noise and truncation
-//! explain, at motion boundaries or changes of lighting, it widens the covariance.
+//! ([`super::high_frequencies`]), where motion and misfit are weak. The residual gives another, its sum of
+//! squares over its expectation `c0 sum w - tr(N^-1 S)`, which misfit can only raise: so the variance is
+//! never more than what chance allows beyond that, and where the residual is that much larger than noise and
+//! truncation explain, at motion boundaries or changes of lighting, it widens the covariance.
 
 use super::bias_planes::{self, Ring};
 use super::covariance_kernels::{Outer, Pass, Scatter, Weigh};
@@ -31,7 +31,7 @@ use super::estimate::Strip;
 use super::high_frequencies::HighFrequencies;
 use super::noise_dominated;
 use super::noise_setting::NoiseSetting;
-use super::sandwich::Sandwich;
+use super::sandwich::{PIXEL, PIXEL_MISFIT, PIXEL_NOISE, PIXEL_RESULT, Sandwich};
 use super::solve::MomentRow;
 use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
 use crate::ablation::keeps;
@@ -119,17 +119,6 @@ impl<T: SimdReal> Scratch<T> {
     }
 }
 
-/// Rows of `Scratch::pixel`.
-const PIXEL: usize = PIXEL_NOISE + ENTRIES;
-/// Where the noise's part of the result begins.
-pub(super) const PIXEL_NOISE: usize = PIXEL_SHARE + 2;
-/// Where the noise's share of the equations stands, and the variance of the noise.
-pub(super) const PIXEL_SHARE: usize = PIXEL_RESULT + ENTRIES;
-/// Where the result begins among them.
-pub(super) const PIXEL_RESULT: usize = PIXEL_MISFIT + 12 + 3;
-/// Where the misfit's scores begin: six entries of the truncation's, six of the flow's, the truncation's
-/// energy, the energy of the detail and the weight of the pixels that have detail.
-pub(super) const PIXEL_MISFIT: usize = ENTRIES + 6 + 2 + 6;
 /// The covariance of a band of rows.
 struct BandTask<'a, 'b, T> {
     setting: &'a NoiseSetting<T>,

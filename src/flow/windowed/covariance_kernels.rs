@@ -1,6 +1,7 @@
 //! The steps of the covariance, each a kernel over one row of a tile.
 
-use super::noise::{columns, pulled_back};
+use super::jet_matrix::columns;
+use super::noise::pulled_back;
 use super::noise_setting::NoiseSetting;
 use super::rows::Plan;
 use super::tile::{JetTile, Planes};

@@ -2,11 +2,11 @@
 //! Gaussian window.
 //!
 //! A pixel alone gives twelve equations for its six unknowns, `[J(i); J(i')] m = [i'; i'']`. A window gives
-//! thousands, provided that the unknowns are *transported*: at the offset `(dx, dy)` from the centre the affine
-//! motion is `m(p) = T m`, with `u + u_x dx + u_y dy`, `v + v_x dx + v_y dy` and the same Jacobian. The
-//! estimate minimises `sum_p w(p) |A_p T_p m - b_p|^2`, `w` a Gaussian of [`WindowedOptions::sigma`], `A_p`,
-//! `b_p` the rows of [`RowSet`], all of equal weight. Its normal matrix `sum w T^T A^T A T` consists of the
-//! moments 1, dx, dy, dx^2, dx dy, dy^2 of products of jets, which are separable sums.
+//! thousands, provided that the unknowns are *transported*: at the offset `(dx, dy)` from the centre the
+//! affine motion is `m(p) = T m`, with `u + u_x dx + u_y dy`, `v + v_x dx + v_y dy` and the same Jacobian.
+//! The estimate minimises `sum_p w(p) |A_p T_p m - b_p|^2`, `w` a Gaussian of [`WindowedOptions::sigma`],
+//! `A_p`, `b_p` the rows of [`RowSet`], all of equal weight. Its normal matrix `sum w T^T A^T A T` consists
+//! of the moments 1, dx, dy, dx^2, dx dy, dy^2 of products of jets, which are separable sums.
 //!
 //! There is no pyramid: motion should stay below about a pixel a frame for fine texture. Equations, rows and
 //! what the covariance holds: `docs/local_flow.md`.
@@ -34,6 +34,7 @@ mod covariance;
 mod covariance_kernels;
 mod estimate;
 mod high_frequencies;
+mod jet_matrix;
 mod noise;
 mod noise_dominated;
 mod noise_setting;

@@ -5,37 +5,12 @@
 //! and linear in m; both views are needed.
 
 use super::combine::Combination;
+use super::jet_matrix::basis;
 use super::truncation::{DERIVATIVES, Truncation};
 use crate::flow::moment_filter::weights;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::jet::JetStencil;
 use crate::simd::Lanes;
-
-/// The rows of `P(jet)`: for each unknown its column, only the first `ROWS` (1, 3 or 6) rows of it.
-#[inline(always)]
-pub(super) fn columns<V: Lanes, const ROWS: usize>(jet: &[V; 6]) -> [[V; 6]; 6] {
-    let [_, x, y, xx, xy, yy] = *jet;
-    let o = V::zero();
-    match ROWS {
-        1 => [[x, o, o, o, o, o], [y, o, o, o, o, o], [o; 6], [o; 6], [o; 6], [o; 6]],
-        3 => [
-            [x, xx, xy, o, o, o],
-            [y, xy, yy, o, o, o],
-            [o, x, o, o, o, o],
-            [o, y, o, o, o, o],
-            [o, o, x, o, o, o],
-            [o, o, y, o, o, o],
-        ],
-        _ => [
-            [x, xx, xy, o, o, o],
-            [y, xy, yy, o, o, o],
-            [o, x, o, xx + xx, xy, o],
-            [o, y, o, xy + xy, yy, o],
-            [o, o, x, o, xx, xy + xy],
-            [o, o, y, o, xy, yy + yy],
-        ],
-    }
-}
 
 /// Weights of the jet's components in `c . (P(jet) m)`, for weights `c` of the rows.
 #[inline(always)]
@@ -131,19 +106,6 @@ impl PixelNoise {
             mixing: independent(ways, &|a, b| dot(a, b)),
         }
     }
-}
-
-/// `basis[j][a][k]`: how component j of the jet enters column a, row k of P.
-pub(super) fn basis(rows: usize) -> [[[f64; 6]; 6]; 6] {
-    std::array::from_fn(|j| {
-        let mut jet = [0.0; 6];
-        jet[j] = 1.0;
-        match rows {
-            1 => columns::<f64, 1>(&jet),
-            3 => columns::<f64, 3>(&jet),
-            _ => columns::<f64, 6>(&jet),
-        }
-    })
 }
 
 /// Cholesky factor of the Gram matrix of the ways, column by column; columns of zero are left out.

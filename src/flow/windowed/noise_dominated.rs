@@ -6,9 +6,8 @@
 //! an estimate leaves open is as large as the spread of the one that undoes the attenuation, `1 / (1 - a)`
 //! times as wide.
 
-use super::covariance::{PIXEL_RESULT, PIXEL_SHARE};
 use super::noise::PixelNoise;
-use super::sandwich::noise_entry;
+use super::sandwich::{PIXEL_RESULT, PIXEL_SHARE, noise_entry};
 use super::tile::TILE_COLUMNS;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;

@@ -1,7 +1,6 @@
 //! From strips to the field: each site's estimate to its place.
 
 use super::estimate::Strip;
-use super::run::Job;
 use crate::flow::site::FieldBand;
 use crate::flow::symmetric::upper;
 use crate::simd::SimdReal;
@@ -9,7 +8,19 @@ use crate::types::{SamplingGrid, Status};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Estimates and, where asked for, covariances of a part of the sites.
+/// Where the computed part of the frame lies, and its units.
+pub(super) struct Crop {
+    /// Width of the whole frame, px.
+    pub frame_width: usize,
+    /// Frame coordinates of the part's corner, px.
+    pub origin: (usize, usize),
+    /// Derivatives were computed in this unit of length, 1/px.
+    pub scale: f64,
+    /// Equations at each pixel.
+    pub equations: usize,
+}
+
+/// Estimates and, on request, covariances of a part of the sites.
 pub(super) struct Results<T> {
     pub strip: Strip<T>,
     pub covariance: Option<Covariance<T>>,
@@ -24,27 +35,27 @@ pub(super) struct Covariance<T> {
 
 impl<T: SimdReal> Results<T> {
     /// Copies the sites that lie in the strip to their bands.
-    pub(super) fn write(&self, job: &Job<'_, T>, sites: &SamplingGrid, bands: &mut [FieldBand<'_, T>]) {
+    pub(super) fn write(&self, crop: &Crop, sites: &SamplingGrid, bands: &mut [FieldBand<'_, T>]) {
         bands.par_iter_mut().for_each(|band| match sites {
             SamplingGrid::Grid { region, stride } => {
-                let width = region.map_or(job.whole.0, |r| r.width).div_ceil(*stride);
+                let width = region.map_or(crop.frame_width, |r| r.width).div_ceil(*stride);
                 for row in band.sites.start / width..band.sites.end / width {
                     let run = Run { at: sites.pixel(0, row), step: *stride, count: width };
-                    self.write_run(job, &run, row * width - band.sites.start, band);
+                    self.write_run(crop, &run, row * width - band.sites.start, band);
                 }
             }
             SamplingGrid::Points(points) => {
                 for index in band.sites.clone() {
                     let run = Run { at: points[index], step: 1, count: 1 };
-                    self.write_run(job, &run, index - band.sites.start, band);
+                    self.write_run(crop, &run, index - band.sites.start, band);
                 }
             }
         });
     }
 
     /// Copies the results of a run of the frame's pixels, if they are here, to the band from place `to` on.
-    pub(super) fn write_run(&self, job: &Job<'_, T>, run: &Run, to: usize, band: &mut FieldBand<'_, T>) {
-        let (x, y) = (job.local_x(run.at.0), job.local_y(run.at.1));
+    pub(super) fn write_run(&self, crop: &Crop, run: &Run, to: usize, band: &mut FieldBand<'_, T>) {
+        let (x, y) = (run.at.0 - crop.origin.0, run.at.1 - crop.origin.1);
         let strip = &self.strip;
         let wanted = self.covariance.as_ref().map_or(&strip.rows, |c| &c.rows);
         if wanted.first().is_none_or(|first| y < *first) || wanted.last().is_none_or(|last| y > *last) {
@@ -58,7 +69,7 @@ impl<T: SimdReal> Results<T> {
             let target = &mut plane[places.clone()];
             run.copy(&strip.motion, k * n + from, target);
             if k >= 2 {
-                let unit = T::from_f64(job.setting.scale);
+                let unit = T::from_f64(crop.scale);
                 for value in target {
                     *value *= unit;
                 }
@@ -73,7 +84,7 @@ impl<T: SimdReal> Results<T> {
             withdraw_unusable(band, places.clone());
         }
         if let Some(plane) = &mut band.residual {
-            let rows = T::from_f64(job.setting.rows as f64);
+            let rows = T::from_f64(crop.equations as f64);
             let sources = strip.residual[from..].iter().zip(&strip.weight[from..]).step_by(run.step);
             for (value, (sum, weight)) in plane[places.clone()].iter_mut().zip(sources) {
                 *value = crate::simd::Lanes::sqrt(*sum / (rows * *weight));

@@ -26,7 +26,7 @@ pub(super) const FLOW_PLANES: usize = 3;
 /// `Ixx Ix, Ixx Iy, Ixy Ix, Ixy Iy, Iyy Ix, Iyy Iy`.
 const MIXED_PLANES: usize = 6;
 /// Planes of the largest plan.
-pub(super) const MOST_PLANES: usize = Plan::new(12).planes();
+pub(super) const MAX_PLANES: usize = Plan::new(12).planes();
 
 impl Plan {
     /// The plan of row 1 (`rows = 1`), rows 1-3, and rows 1-6 or 1-12 (`rows >= 6`).
@@ -153,7 +153,7 @@ fn add_block<V: Lanes, const ROWS: usize>(
     jet: &[V; 6],
     rate: &[V; 6],
     scale: V,
-    planes: &mut [V; MOST_PLANES],
+    planes: &mut [V; MAX_PLANES],
 ) {
     let [_, x, y, xx, xy, yy] = *jet;
     let n = plan.normal();
@@ -224,9 +224,9 @@ fn add_block<V: Lanes, const ROWS: usize>(
 
 /// All product planes of one pixel for `ROWS` = 1, 3, 6 or 12 rows; the first [`Plan::planes`] are used.
 #[inline(always)]
-pub(super) fn products<V: Lanes, const ROWS: usize>(jets: &Jets<V>, scale: V) -> [V; MOST_PLANES] {
+pub(super) fn products<V: Lanes, const ROWS: usize>(jets: &Jets<V>, scale: V) -> [V; MAX_PLANES] {
     let plan = Plan::new(ROWS);
-    let mut planes = [V::zero(); MOST_PLANES];
+    let mut planes = [V::zero(); MAX_PLANES];
     add_block::<V, ROWS>(plan, &jets.coefficient, &jets.first, scale, &mut planes);
     if ROWS == 12 {
         add_block::<V, ROWS>(plan, &jets.first, &jets.second, scale, &mut planes);

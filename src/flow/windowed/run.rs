@@ -5,7 +5,7 @@ use super::estimate::{Setting, Strip};
 use super::high_frequencies::HighFrequencies;
 use super::noise_setting::NoiseSetting;
 use super::options::WindowedOptions;
-use super::results::{Covariance, Results, Run};
+use super::results::{Covariance, Crop, Results, Run};
 use super::support::Support;
 use super::tile::Source;
 use super::window::Window;
@@ -75,7 +75,7 @@ impl Windowed {
                 let rows: Vec<usize> = (0..field.height).map(|r| top + r * stride).collect();
                 let mut field_bands = bands(field);
                 for (rows, bands) in rows.chunks(STRIP_ROWS).zip(field_bands.chunks_mut(STRIP_ROWS / BAND_ROWS)) {
-                    job.strip(rows, columns.clone()).write(&job, &sites, bands);
+                    job.strip(rows, columns.clone()).write(&job.crop, &sites, bands);
                 }
             }
             SamplingGrid::Points(points) => self.points(frames, (common, rounded), points, field),
@@ -103,7 +103,7 @@ impl Windowed {
                     let column = job.local_x(x);
                     let results = job.strip(&[job.local_y(y)], column..column + 1);
                     let run = Run { at: (x, y), step: 1, count: 1 };
-                    results.write_run(&job, &run, index - band.sites.start, &mut band);
+                    results.write_run(&job.crop, &run, index - band.sites.start, &mut band);
                 }
             });
         } else {
@@ -112,7 +112,7 @@ impl Windowed {
             let rows: Vec<usize> = (top..top + box_.height).collect();
             let mut field_bands = bands(field);
             for rows in rows.chunks(STRIP_ROWS) {
-                job.strip(rows, left..left + box_.width).write(&job, &sites, &mut field_bands);
+                job.strip(rows, left..left + box_.width).write(&job.crop, &sites, &mut field_bands);
             }
         }
     }
@@ -132,11 +132,8 @@ pub(super) struct Job<'a, T: Clone> {
     owner: &'a Windowed,
     frames: Vec<Cow<'a, Frame<T>>>,
     support: Support,
-    /// Size of the uncropped frames.
-    pub whole: (usize, usize),
-    /// Frame coordinates of the crop's corner.
-    origin: (usize, usize),
-    pub setting: Setting<T>,
+    crop: Crop,
+    setting: Setting<T>,
     noise: Option<NoiseSetting<T>>,
     /// What the noise is read from, unless it is given.
     detail: Option<HighFrequencies<T>>,
@@ -151,10 +148,15 @@ impl<'a, T: SimdReal> Job<'a, T> {
     ) -> Self {
         let options = &owner.options;
         let whole = frames[0].size();
-        let crop = crop(sites, whole, owner.margin(common));
-        let origin = (crop.x, crop.y);
-        let frames: Vec<Cow<'a, Frame<T>>> = frames.iter().map(|f| cut(f, crop)).collect();
-        let mask = common.mask.as_ref().map(|m| cut(m, crop));
+        let part = crop(sites, whole, owner.margin(common));
+        let crop = Crop {
+            frame_width: whole.0,
+            origin: (part.x, part.y),
+            scale: 1.0 / options.sigma,
+            equations: options.rows.count(),
+        };
+        let frames: Vec<Cow<'a, Frame<T>>> = frames.iter().map(|f| cut(f, part)).collect();
+        let mask = common.mask.as_ref().map(|m| cut(m, part));
         let plain: Vec<&Frame<T>> = frames.iter().map(AsRef::as_ref).collect();
         let spread = owner.smoother.as_ref().map_or(0, GaussianSmoother::radius);
         let support = Support::new(&plain, mask.as_deref(), owner.stencil.reach(), spread);
@@ -167,8 +169,8 @@ impl<'a, T: SimdReal> Job<'a, T> {
         let window = Window::gaussian(options.sigma, options.radius());
         let setting = Setting {
             window: window.clone(),
-            scale: 1.0 / options.sigma,
-            rows: options.rows.count(),
+            scale: crop.scale,
+            rows: crop.equations,
             policy: options.rank_deficient,
             floor: rounding_floor(frames.iter().map(AsRef::as_ref)),
             level: common.level(),
@@ -178,14 +180,14 @@ impl<'a, T: SimdReal> Job<'a, T> {
         let noise = common
             .covariance
             .then(|| NoiseSetting::new((options, &owner.stencil), (common, rounded), window, frames.len()));
-        Self { owner, frames, support, whole, origin, setting, noise, detail }
+        Self { owner, frames, support, crop, setting, noise, detail }
     }
 
     pub fn local_x(&self, x: usize) -> usize {
-        x - self.origin.0
+        x - self.crop.origin.0
     }
     pub fn local_y(&self, y: usize) -> usize {
-        y - self.origin.1
+        y - self.crop.origin.1
     }
 
     /// Everything at these rows and columns of the crop.

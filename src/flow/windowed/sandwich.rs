@@ -1,6 +1,5 @@
 //! The covariance of one row of pixels, from what the passes have summed for them.
 
-use super::covariance::{PIXEL_MISFIT, PIXEL_NOISE, PIXEL_RESULT, PIXEL_SHARE};
 use super::noise::PixelNoise;
 use super::noise_setting::NoiseSetting;
 use super::solve::{MomentRow, normal_matrix};
@@ -8,6 +7,18 @@ use super::tile::TILE_COLUMNS;
 use crate::ablation::keeps;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::{Kernel, Lanes, SimdReal};
+
+/// Rows of the planes of a row of pixels, that the covariance is computed in.
+pub(super) const PIXEL: usize = PIXEL_NOISE + ENTRIES;
+/// Where the noise's part of the result begins.
+pub(super) const PIXEL_NOISE: usize = PIXEL_SHARE + 2;
+/// Where the noise's share of the equations stands, and the variance of the noise.
+pub(super) const PIXEL_SHARE: usize = PIXEL_RESULT + ENTRIES;
+/// Where the result begins among them.
+pub(super) const PIXEL_RESULT: usize = PIXEL_MISFIT + 12 + 3;
+/// Where the misfit's scores begin: six entries of the truncation's, six of the flow's, the truncation's
+/// energy, the energy of the detail and the weight of the pixels that have detail.
+pub(super) const PIXEL_MISFIT: usize = ENTRIES + 6 + 2 + 6;
 
 /// Fixed-point steps towards the true motion in the pull of the noise.
 const PULL_STEPS: usize = 3;

@@ -10,7 +10,7 @@
 //! estimate.
 
 use super::combine::Combination;
-use super::noise::basis;
+use super::jet_matrix::basis;
 use crate::jet::{JetStencil, TimeScheme};
 use crate::simd::Lanes;
 
@@ -170,7 +170,7 @@ pub(super) fn residual<V: Lanes, const BLOCK: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::noise::columns;
+    use super::super::jet_matrix::columns;
     use super::*;
     use crate::image::GaussianSmoother;
     use crate::jet::Neighbourhood;

@@ -135,8 +135,8 @@ impl<'a, T: SimdReal> DataTerm<'a, T> {
     ///
     /// `motion` holds the [`MOTION`] planes on the sites, finite, in px of this level per frame. `scale` is
     /// the standard deviation of `R` where brightness is constant; without it every usable pixel has the
-    /// weight 1. Views and masks have `size`. Runs in the caller's thread pool; the result does not depend on the
-    /// number of threads.
+    /// weight 1. Views and masks have `size`. Runs in the caller's thread pool; the result does not depend on
+    /// the number of threads.
     pub fn linearise(
         &self,
         size: (usize, usize),

@@ -279,7 +279,7 @@ mod tests {
     }
 
     /// What is found when the square has moved once.
-    fn told(bounds: TargetBox, moved: [usize; 2], hidden_to: usize) -> Option<HiddenPart> {
+    fn found_in(bounds: TargetBox, moved: [usize; 2], hidden_to: usize) -> Option<HiddenPart> {
         let first = scene([0; 2], hidden_to, 1);
         let mut outset = InitialSegmentation::new(&first, bounds, Target::new(&first, bounds, 144.0));
         find_occluder(&mut outset, &scene(moved, hidden_to, 2), 1.5)
@@ -292,7 +292,7 @@ mod tests {
     #[test]
     fn what_hides_part_of_the_box_is_told_to_the_pixel() {
         for hidden_to in [44, 50, 54] {
-            let found = told(exact(), [4, 1], hidden_to).unwrap();
+            let found = found_in(exact(), [4, 1], hidden_to).unwrap();
             assert_eq!((found.moved, found.frames), ([4.0, 1.0], 1));
             let count = found.hidden.data().iter().filter(|hidden| **hidden).count();
             assert_eq!(count, (hidden_to - 40) * SIDE, "{hidden_to}");
@@ -301,11 +301,11 @@ mod tests {
 
     #[test]
     fn a_target_that_nothing_hides_is_left_alone_whether_its_box_is_right_or_not() {
-        assert!(told(exact(), [4, 1], 0).is_none());
-        assert!(told(TargetBox { x: 35.5, y: 25.5, width: 28.0, height: 28.0 }, [4, 1], 0).is_none());
-        assert!(told(TargetBox { x: 43.5, y: 33.5, width: 12.0, height: 12.0 }, [4, 1], 0).is_none());
+        assert!(found_in(exact(), [4, 1], 0).is_none());
+        assert!(found_in(TargetBox { x: 35.5, y: 25.5, width: 28.0, height: 28.0 }, [4, 1], 0).is_none());
+        assert!(found_in(TargetBox { x: 43.5, y: 33.5, width: 12.0, height: 12.0 }, [4, 1], 0).is_none());
         // What does not move shows nothing.
-        assert!(told(exact(), [0, 0], 50).is_none());
+        assert!(found_in(exact(), [0, 0], 50).is_none());
     }
 
     #[test]

@@ -177,7 +177,7 @@ mod tests {
         })
     }
 
-    fn told(bounds: TargetBox, moved: [usize; 2], hidden_to: usize, level: f64) -> Option<TargetBox> {
+    fn found_in(bounds: TargetBox, moved: [usize; 2], hidden_to: usize, level: f64) -> Option<TargetBox> {
         let first = scene([0; 2], hidden_to, level, 1);
         let outset = InitialSegmentation::new(&first, bounds, Target::new(&first, bounds, PRIOR));
         outset.refitted(&scene(moved, hidden_to, level, 2), NOISE).map(|found| found.bounds)
@@ -192,23 +192,23 @@ mod tests {
     fn boxes_too_large_and_beside_are_told() {
         let truth = exact([2.0, 3.0], 1.0);
         for wrong in [exact([0.0; 2], 1.4), exact([3.0, -2.0], 1.0), exact([-4.0, 0.0], 1.0), exact([1.0, 1.0], 1.4)] {
-            let found = told(wrong, [2, 3], 0, 200.0).unwrap();
+            let found = found_in(wrong, [2, 3], 0, 200.0).unwrap();
             assert!(found.overlap(&truth) > 0.8, "{wrong:?}: {found:?}");
         }
     }
 
     #[test]
     fn boxes_that_fit_and_targets_that_do_not_stand_out_are_left_alone() {
-        assert_eq!(told(exact([0.0; 2], 1.0), [2, 3], 0, 200.0), None);
+        assert_eq!(found_in(exact([0.0; 2], 1.0), [2, 3], 0, 200.0), None);
         // A displacement of which whole pixels say too little.
-        assert_eq!(told(exact([0.0; 2], 1.4), [1, 1], 0, 200.0), None);
-        assert!(told(exact([0.0; 2], 1.4), [2, 1], 0, 200.0).is_some());
-        assert_eq!(told(exact([0.0; 2], 1.4), [2, 3], 0, 92.0), None);
+        assert_eq!(found_in(exact([0.0; 2], 1.4), [1, 1], 0, 200.0), None);
+        assert!(found_in(exact([0.0; 2], 1.4), [2, 1], 0, 200.0).is_some());
+        assert_eq!(found_in(exact([0.0; 2], 1.4), [2, 3], 0, 92.0), None);
     }
 
     #[test]
     fn a_target_of_which_something_hides_a_side_keeps_its_box() {
-        assert_eq!(told(exact([0.0; 2], 1.0), [3, 0], 44, 200.0), None);
-        assert_eq!(told(exact([0.0; 2], 1.0), [3, 0], 46, 200.0), None);
+        assert_eq!(found_in(exact([0.0; 2], 1.0), [3, 0], 44, 200.0), None);
+        assert_eq!(found_in(exact([0.0; 2], 1.0), [3, 0], 46, 200.0), None);
     }
 }

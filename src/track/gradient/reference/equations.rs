@@ -3,7 +3,7 @@
 //! are refused.
 
 use super::kernels::{DerivativeKernels, REACH};
-use super::local_flow::LocalFlowOptions;
+use super::options::LocalFlowOptions;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
 use std::ops::Range;

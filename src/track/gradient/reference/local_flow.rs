@@ -3,35 +3,13 @@
 
 use super::equations::Equations;
 use super::kernels::kernels_of;
+use super::options::LocalFlowOptions;
 use crate::track::gradient::noise::noise_of;
 use crate::track::gradient::shift::shifted;
 use crate::types::Frame;
 
 /// Weakest gradient that counts, over the noise.
 const OVER_NOISE: f64 = 0.7;
-
-/// How local flow is computed and what is accepted of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LocalFlowOptions {
-    /// Side of the window of equations, px, odd.
-    pub window: usize,
-    /// Degree of the polynomials behind the derivatives, 1 to 4.
-    pub order: usize,
-    /// Largest condition number `sqrt(lambda_max / lambda_min)` of the gradients in the window (8).
-    pub cond_max: f64,
-    /// Least gradient along the weaker direction, `sqrt(lambda_min / m)`, grey levels/px. Above 0 it is at
-    /// least 0.7 times the noise of the frames: the condition number does not change with contrast, so that
-    /// weak texture and noise pass it.
-    pub min_sigma: f64,
-    /// Longest step of one solution (4), px.
-    pub step_max: f64,
-}
-
-impl Default for LocalFlowOptions {
-    fn default() -> Self {
-        Self { window: 7, order: 4, cond_max: 10.0, min_sigma: 2.5, step_max: 4.0 }
-    }
-}
 
 /// Flow at every pixel of a frame.
 #[derive(Debug, Clone, PartialEq)]

@@ -186,7 +186,7 @@ impl LocalLoop {
         if let Some(frame) = frame {
             self.before = self.cut(frame);
         }
-        self.tell(state, found, (innovation, measured, was_lost));
+        self.report(state, found, (innovation, measured, was_lost));
         if all_moves && state.status == TrackStatus::Coasting {
             state.reason = ALL_MOVES;
         }
@@ -346,7 +346,7 @@ impl LocalLoop {
         }
     }
 
-    fn tell(
+    fn report(
         &self,
         state: &mut TrackState,
         found: Option<MeanFlow>,

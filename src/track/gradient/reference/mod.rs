@@ -16,8 +16,9 @@ mod options;
 mod refine;
 
 pub use kernels::{DerivativeKernels, KernelMask, derivative_kernels};
-pub use local_flow::{LocalFlow, LocalFlowOptions, MeanFlow, local_flow};
+pub use local_flow::{LocalFlow, MeanFlow, local_flow};
 pub(super) use local_loop::LocalLoop;
 pub use local_loop::SearchWindow;
+pub use options::LocalFlowOptions;
 pub use options::{Control, Method, ReferenceOptions};
 pub use refine::{RefineOptions, refine_flow};

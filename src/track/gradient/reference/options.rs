@@ -1,10 +1,32 @@
 //! Options of the paper's loop, and what its two methods differ by.
 
 use super::kernels::gradient_of_rounding;
-use super::local_flow::LocalFlowOptions;
 use crate::error::{Error, Result};
 use crate::track::gradient::gauss_markov::{Dynamics, Velocity};
 use crate::track::gradient::options::CameraMotion;
+
+/// How local flow is computed and what is accepted of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LocalFlowOptions {
+    /// Side of the window of equations, px, odd.
+    pub window: usize,
+    /// Degree of the polynomials behind the derivatives, 1 to 4.
+    pub order: usize,
+    /// Largest condition number `sqrt(lambda_max / lambda_min)` of the gradients in the window (8).
+    pub cond_max: f64,
+    /// Least gradient along the weaker direction, `sqrt(lambda_min / m)`, grey levels/px. Above 0 it is at
+    /// least 0.7 times the noise of the frames: the condition number does not change with contrast, so that
+    /// weak texture and noise pass it.
+    pub min_sigma: f64,
+    /// Longest step of one solution (4), px.
+    pub step_max: f64,
+}
+
+impl Default for LocalFlowOptions {
+    fn default() -> Self {
+        Self { window: 7, order: 4, cond_max: 10.0, min_sigma: 2.5, step_max: 4.0 }
+    }
+}
 
 /// Which variant of the loop follows the target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -2,7 +2,8 @@
 
 use super::equations::Equations;
 use super::kernels::{REACH, kernels_of};
-use super::local_flow::{LocalFlow, LocalFlowOptions};
+use super::local_flow::LocalFlow;
+use super::options::LocalFlowOptions;
 use crate::image::Spline;
 use crate::simd::Level;
 use crate::track::gradient::noise::median;
