@@ -180,6 +180,7 @@ fn cross_covariance(stencil: &JetStencil, smooth: Option<f64>) -> [[f64; DERIVAT
 
 #[cfg(test)]
 mod tests {
+    use super::super::jet_matrix::columns;
     use super::*;
     use crate::jet::{Neighbourhood, TimeScheme};
     use crate::math::random::CounterRng;
