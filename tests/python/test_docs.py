@@ -41,7 +41,7 @@ def public():
                         yield f"{module_name}.{name}.{member}", getattr(thing, member)
 
 
-@pytest.mark.parametrize(("name", "thing"), list(public()), ids=lambda value: value if isinstance(value, str) else "")
+@pytest.mark.parametrize(("name", "thing"), sorted(public(), key=lambda pair: pair[0]), ids=lambda value: value if isinstance(value, str) else "")
 def test_every_public_name_tells_shapes_or_units(name, thing):
     if isinstance(thing, type) and issubclass(thing, BaseException):
         assert thing.__doc__
