@@ -33,14 +33,12 @@ class CoarseToFine:
 
     method: ClassVar[str] = "coarse_to_fine"
     preset: Literal["fast", "balanced", "accurate"] | None = None
-    """Cost against error; default "balanced". "fast" finds the motion at half the resolution and loses detail
-    of
+    """Cost against error; default "balanced". "fast" finds the motion at half the resolution and loses detail of
     a few px; "accurate" iterates more."""
     levels: int | None = None
     """Pyramid levels; default as many as the frame allows."""
     time_scheme: Literal["forward", "central", "pair"] | None = None
-    """How time derivatives are taken. "forward" (default): motion from the middle frame of three to the next
-    one;
+    """How time derivatives are taken. "forward" (default): motion from the middle frame of three to the next one;
     the frame before it helps where the motion is steady. "central": mean of the steps before and after, the
     velocity at the middle frame. "pair": motion from the first of two frames to the second, the default where
     there are only two."""

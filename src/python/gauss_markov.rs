@@ -41,7 +41,8 @@ impl PyGaussMarkovFilter {
         self.0.predict();
     }
 
-    /// Takes a measurement: values and variances along x and y; returns its normalised innovation squared.
+    /// Takes a measurement: values and variances along x and y; returns its normalised innovation
+    /// squared.
     #[pyo3(signature = (position, velocity))]
     fn update(
         &mut self,

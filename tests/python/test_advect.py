@@ -24,7 +24,7 @@ def truth():
 @pytest.fixture(scope="module")
 def estimated():
     """An estimate with covariance, and the stack (T = 4) of a longer sequence."""
-    frames = scene(seed=4).frames(6)
+    frames = scene(random_state=4).frames(6)
     return jacoflow.estimate(list(frames[:3]), method="windowed"), jacoflow.estimate(frames, method="windowed")
 
 
@@ -50,7 +50,7 @@ def test_a_site_moves_by_its_own_flow(estimated):
 
 def test_between_sites_of_a_coarse_grid_the_jacobian_counts():
     """A field on every fourth pixel is as exact for affine motion as a dense one; the bilinear mean of a curved one is not."""
-    frames = list(scene(seed=4).frames(3))
+    frames = list(scene(random_state=4).frames(3))
     coarse = jacoflow.estimate(frames, method="windowed", grid=jacoflow.SamplingGrid(stride=4, region=(4, 4, 29, 25)))
     assert np.isfinite(coarse.advect([[5.0, 5.5], [32.0, 28.0]])).all()
     assert np.isnan(coarse.advect([[3.9, 5.5], [32.1, 20.0], [20.0, 28.1]])).all()
@@ -76,7 +76,7 @@ def test_covariance_against_monte_carlo(estimated):
 
 
 def test_a_model_without_derivatives_takes_the_slope_of_the_flow():
-    frames = list(scene(seed=4).frames(2))
+    frames = list(scene(random_state=4).frames(2))
     field = jacoflow.estimate(frames, method="lucas_kanade")
     _, spread = field.advect([[20.25, 16.5]], np.eye(2))
     moved = [field.advect([[20.25 + dx, 16.5 + dy]])[0] for dx, dy in ((0.01, 0), (-0.01, 0), (0, 0.01), (0, -0.01))]
@@ -103,7 +103,7 @@ def test_a_stack_carries_points_through_all_its_fields(estimated, points):
 
 
 def test_what_left_the_field_stays_unknown():
-    field = jacoflow.estimate(scene(seed=4).frames(5), method="windowed")
+    field = jacoflow.estimate(scene(random_state=4).frames(5), method="windowed")
     path = field.advect([[38.9, 30.9], [np.nan, 4.0], [-5.0, 4.0]])
     assert np.isnan(path[1:, 1:]).all() and np.isnan(path[-1]).any()
 

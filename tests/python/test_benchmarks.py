@@ -13,7 +13,7 @@ from benchmarks.ablation import __main__ as ablation
 from benchmarks.scores import flow as scoring
 from benchmarks.scores import noise_bound
 from benchmarks.tables import controlled
-from jacoflow import scenes
+from jacoflow import Windowed, scenes
 
 
 def test_the_jacobian_counts_away_from_edges_and_unknown_truth():
@@ -112,7 +112,7 @@ def test_the_gradient_of_a_controlled_scene_is_its_textures():
 
 
 def test_settings_are_called_with_their_options():
-    setting = contestants.Setting("windowed", {"method": "windowed", "window_sigma": 3.0}, frames=2, window=3.0)
+    setting = contestants.Setting("windowed", {"method": Windowed(window_sigma=3.0)}, frames=2, window=3.0)
     frames = list(scenes.Scene("affine", width=48, height=40).frames(2))
     flow, jacobian = setting.estimate(frames)
     assert flow.shape == (40, 48, 2) and jacobian.shape == (40, 48, 2, 2)

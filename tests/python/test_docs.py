@@ -19,7 +19,18 @@ PACKAGE = Path(jacoflow.__file__).parent
 MODULES = ["jacoflow", *(f"jacoflow.{module.name}" for module in pkgutil.iter_modules([str(PACKAGE)]))]
 SHAPES_OR_UNITS = re.compile(r"\((\.\.\.|H|N|T|B|n|m|2 n|6|12|count)\b|\(\.\.\.,|/frame|/s\b|\bpx\b|\bunits?\b|grey level|rad\b|frames", re.IGNORECASE)
 """An array's shape or a number's unit, or the word that there is none."""
-NOTHING_TO_MEASURE = {"jacoflow.video.Video.close"}
+NOTHING_TO_MEASURE = {
+    "jacoflow.video.Video.close",
+    # Groups of options: each field states its unit.
+    "jacoflow.CoarseToFine",
+    "jacoflow.HornSchunck",
+    "jacoflow.Instantaneous",
+    "jacoflow.LucasKanade",
+    "jacoflow.Preprocess",
+    "jacoflow.SamplingGrid",
+    "jacoflow.Windowed",
+    "jacoflow.track.StereoCamera",
+}
 
 
 def public():

@@ -202,7 +202,7 @@ def observable():
 
 CALLS = {
     **{method: lambda method=method: (field(method).flow,) for method in METHODS},
-    "smoothed": lambda: (field("windowed", smooth=1.0).flow,),
+    "smoothed": lambda: (field("windowed", preprocess=jacoflow.Preprocess(smooth=1.0)).flow,),
     "derived": derived,
     "observability": observable,
     **{f"scene {name}": lambda name=name: scene(name) for name in ("noise", "particles")},

@@ -1,5 +1,6 @@
 //! The estimate itself: moments, normal equations, solution and status of every pixel of a strip of rows.
 
+use super::rounding_floor;
 use super::rows::Plan;
 use super::solve::{Deficient, MomentRow, decompose, normal_matrix, right_side};
 use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
@@ -30,7 +31,8 @@ pub(super) struct Setting<T> {
     pub rows: usize,
     /// What to do with undetermined unknowns.
     pub policy: RankPolicy,
-    /// Largest sum of squared gradients that rounding leaves of a constant image.
+    /// Largest sum of squared gradients that rounding leaves of a constant image as bright as the brightest
+    /// sample; below it the samples of the window decide.
     pub floor: f64,
     /// Instruction set.
     pub level: Level,
@@ -291,7 +293,12 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
             }
             let quality = solved[6 * TILE_COLUMNS + c].to_f64();
             let largest = solved[7 * TILE_COLUMNS + c].to_f64();
-            let determined = quality >= RANK_TOLERANCE && largest > setting.floor;
+            let floor = if largest > setting.floor {
+                setting.floor
+            } else {
+                rounding_floor::about(&source.frames, (x, y), setting.window.radius(), source.reach)
+            };
+            let determined = quality >= RANK_TOLERANCE && largest > floor;
             if determined {
                 band.rank[out] = 6;
             } else {
@@ -304,7 +311,7 @@ impl<T: SimdReal> BandTask<'_, '_, T> {
                 MomentRow { data: &scratch.moments.data, first: g * TILE_COLUMNS, stride: GROUP_ROWS * TILE_COLUMNS };
             let n = normal_matrix::<T, T>(plan, &row, c);
             let right = right_side::<T, T>(plan, &row, c);
-            let Deficient { rank, solution, condition } = decompose(&n, &right, RANK_TOLERANCE, setting.floor);
+            let Deficient { rank, solution, condition } = decompose(&n, &right, RANK_TOLERANCE, floor);
             if let Some(plane) = &mut band.condition {
                 plane[out] = T::from_f64(condition);
             }

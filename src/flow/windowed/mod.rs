@@ -40,6 +40,7 @@ mod noise_dominated;
 mod noise_setting;
 mod options;
 mod results;
+mod rounding_floor;
 mod rows;
 mod run;
 mod sandwich;

@@ -6,6 +6,7 @@ use super::high_frequencies::HighFrequencies;
 use super::noise_setting::NoiseSetting;
 use super::options::WindowedOptions;
 use super::results::{Covariance, Crop, Results, Run};
+use super::rounding_floor;
 use super::support::Support;
 use super::tile::Source;
 use super::window::Window;
@@ -172,7 +173,7 @@ impl<'a, T: SimdReal> Job<'a, T> {
             scale: crop.scale,
             rows: crop.equations,
             policy: options.rank_deficient,
-            floor: rounding_floor(frames.iter().map(AsRef::as_ref)),
+            floor: rounding_floor::of_frames(frames.iter().map(AsRef::as_ref)),
             level: common.level(),
             inverse: common.covariance,
             diagnostics: common.diagnostics,
@@ -214,14 +215,6 @@ impl<'a, T: SimdReal> Job<'a, T> {
         let planes = noise.covariance((&source, self.detail.as_ref()), &strip, rows, &columns);
         Results { strip, covariance: Some(Covariance { planes, rows: rows.to_vec(), columns }) }
     }
-}
-
-/// Largest sum of squared gradients that rounding leaves of a constant image as bright as the brightest
-/// finite sample.
-fn rounding_floor<'a, T: SimdReal>(frames: impl Iterator<Item = &'a Frame<T>>) -> f64 {
-    let epsilon = if size_of::<T>() == 4 { f64::from(f32::EPSILON) } else { f64::EPSILON };
-    let magnitudes = frames.flat_map(Frame::data).map(|v| v.to_f64().abs()).filter(|v| v.is_finite());
-    (8.0 * epsilon * magnitudes.fold(0.0, f64::max)).powi(2)
 }
 
 /// The rectangle with a margin, inside the frame; the whole frame where little would be saved.
