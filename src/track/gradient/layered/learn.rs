@@ -1,12 +1,13 @@
 //! What is learnt from a frame in which the target was seen well.
 
 use super::layers::{Background, PRIOR, Target};
+use super::oriented_box::OrientedBox;
 use super::patch::{dilated, smooth_known};
 use super::score::View;
 use super::state::MIN_NOISE;
 use crate::math::robust_std;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
-use crate::types::{Frame, TargetBox};
+use crate::types::Frame;
 
 /// Memory of the support.
 const FORGETTING: f64 = 0.95;
@@ -100,12 +101,12 @@ fn continue_template(target: &mut Target) {
     }
 }
 
-/// The background outside the box of the target.
-pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, hidden: &TargetBox, noise: f64) {
+/// The background outside the box of the target, which turns with it.
+pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, hidden: &OrientedBox, noise: f64) {
     let sudden = 6.0 * noise + 8.0;
     let (width, height) = frame.size();
     for y in 0..height {
-        let [first, end] = columns(hidden, y, width);
+        let [first, end] = hidden.columns(y, width);
         let parts = if first < end { [0..first, end..width] } else { [0..width, width..width] };
         for part in parts {
             let seen = &frame.row(y)[part.clone()];
@@ -115,15 +116,6 @@ pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, 
             known.fill(true);
         }
     }
-}
-
-/// Columns of a row of pixels that a box holds: the first, and the one after the last.
-fn columns(bounds: &TargetBox, y: usize, width: usize) -> [usize; 2] {
-    if !(bounds.y..=bounds.y + bounds.height).contains(&(y as f64)) {
-        return [0, 0];
-    }
-    let pixel = |at: f64| at.clamp(0.0, width as f64) as usize;
-    [pixel(bounds.x.ceil()), pixel((bounds.x + bounds.width).floor() + 1.0)]
 }
 
 /// The step of the background at a row of pixels.

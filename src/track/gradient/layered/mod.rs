@@ -29,6 +29,7 @@ mod locate;
 mod nearby;
 mod occluder;
 mod occlusion;
+mod oriented_box;
 mod outgrown;
 mod patch;
 mod pose;

@@ -37,7 +37,8 @@ impl InitialSegmentation {
         let found = detect_moving_target(&self.first.frame, &changes.now, Some(near))?;
         let at = found.bounds.centre();
         let sides = [(found.bounds.width, self.bounds.width), (found.bounds.height, self.bounds.height)];
-        let larger = sides.iter().all(|(now, first)| (SIDE_RATIO_RANGE[0]..SIDE_RATIO_RANGE[1]).contains(&(now / first)));
+        let larger =
+            sides.iter().all(|(now, first)| (SIDE_RATIO_RANGE[0]..SIDE_RATIO_RANGE[1]).contains(&(now / first)));
         let middle = (0..2).all(|k| (at[k] - found.displacement[k] - near[k]).abs() < MAX_CENTER_OFFSET * sides[k].1);
         let bounds = TargetBox { x: found.bounds.x + corner[0], y: found.bounds.y + corner[1], ..found.bounds };
         (larger && middle && changes.moved_with(&found)).then_some(MovingTarget { bounds, ..found })

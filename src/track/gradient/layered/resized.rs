@@ -7,7 +7,8 @@
 
 use super::alignment::Alignment;
 use super::finding::{Finding, LEVELS, MIN_VISIBILITY_LOSS, MIN_VISIBILITY_TO_LEARN, PRIOR, RESIZED, try_at};
-use super::layers::{CORE, contains, grown};
+use super::layers::{CORE, grown};
+use super::oriented_box::OrientedBox;
 use super::pose::Pose;
 use super::samples::MAX_RESIDUAL;
 use super::score::{Score, is_hit, view};
@@ -90,7 +91,7 @@ pub(super) fn left_over(state: &State, frame: &Frame<f64>, held: &Finding, resiz
     let Alignment { pose, gain, .. } = held.aligned;
     let other = resized.aligned.pose;
     let sides = state.target.extent();
-    let outline = state.upright(&other);
+    let outline = OrientedBox::about(state.position(&other), &other, sides, (0.0, 0.0));
     let shown = view(frame, &state.target, &state.background, &pose);
     let places = state.target.places(&pose);
     let left_out = state.target.a.data().iter().zip(state.target.t.data()).enumerate().filter(|&(at, (&a, &t))| {
@@ -99,7 +100,7 @@ pub(super) fn left_over(state: &State, frame: &Frame<f64>, held: &Finding, resiz
         a > CORE
             && clear
             && is_hit(shown.seen[at], bright, behind, state.scene.noise)
-            && !contains(&outline, places.get(at))
+            && !outline.contains(places.get(at))
     });
     let growth = other.scale() / pose.scale();
     left_out.count() as f64 / (sides[0] * sides[1] * growth * growth)

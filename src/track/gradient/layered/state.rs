@@ -2,7 +2,8 @@
 
 use super::camera::FramePyramid;
 use super::initial::InitialSegmentation;
-use super::layers::{Background, PRIOR, Target, grown};
+use super::layers::{Background, PRIOR, Target};
+use super::oriented_box::OrientedBox;
 use super::pose::Pose;
 use super::task::MotionModel;
 use crate::track::gradient::gauss_markov::{Dynamics, GaussMarkovFilter, Velocity};
@@ -197,14 +198,8 @@ impl State {
     }
 
     /// Where it hides the scene, with a margin.
-    pub fn hides(&self) -> TargetBox {
-        grown(self.upright(&self.motion.pose), HIDES)
-    }
-
-    /// Box of the target at a pose as if it had not turned.
-    pub fn upright(&self, pose: &Pose) -> TargetBox {
-        let [width, height] = self.target.extent();
-        TargetBox::about(self.position(pose), width * pose.scale(), height * pose.scale())
+    pub fn hides(&self) -> OrientedBox {
+        OrientedBox::about(self.position(&self.motion.pose), &self.motion.pose, self.target.extent(), HIDES)
     }
 
     /// Upright box around the target at a pose, its corners included.
