@@ -122,8 +122,8 @@ fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let found = robust::consensus(scaled, rng);
     scaled.observations.rescale(own);
     let mut found = found?;
-    for rival in &mut found.rivals {
-        rival.excess *= own * own;
+    for competitor in &mut found.competing {
+        competitor.excess *= own * own;
     }
     Some(found)
 }

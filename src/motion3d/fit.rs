@@ -11,7 +11,7 @@ use super::model::options::{Method, MotionOptions};
 use super::model::result::{Alternative, MotionEstimate, Status};
 use super::model::statistics::by_chance;
 use super::model::whitening::Whitening;
-use super::robust::{Consensus, Rival, larger};
+use super::robust::{CompetingMotion, Consensus, larger};
 use super::solver::covariance::{PluginCovariances, direction_deviation, plugged};
 use super::solver::efficient::{Efficient, WeightDepths, beyond_theory, unsolved};
 use super::solver::finite_rotation::{matters, settle, shift};
@@ -96,11 +96,11 @@ impl Task<'_, '_> {
             .iter()
             .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
             .collect();
-        let rivals: &[Rival] = self.known.map_or(&[], |known| &known.rivals);
+        let competing: &[CompetingMotion] = self.known.map_or(&[], |known| &known.competing);
         let Solved { mut solution, deviation, low, told, undecided } = solved;
         let likelihood = (*candidates[0].motion(), candidates[0].minimum.equations.behind);
         let unknown = scaled.unknown;
-        let evidence = Evidence { likelihood, deviation, low, told, unknown, rivals, undecided };
+        let evidence = Evidence { likelihood, deviation, low, told, unknown, competing, undecided };
         judge(self.whitening, &inliers, &mut solution, &evidence, self.rng.stream(4));
         report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
     }
@@ -246,7 +246,7 @@ impl Task<'_, '_> {
     /// `cost`: what maximum likelihood leaves.
     fn inflate(&self, solution: &mut Solution, scaled: &Scaled, inliers: &Observations, cost: f64) {
         if let Some(known) = self.known {
-            solution.among_strays(&scaled.observations, known, self.options.weight_depths.is_some());
+            solution.weighted_by_posterior(&scaled.observations, known, self.options.weight_depths.is_some());
         }
         let common = solution.systematic_effect(inliers, self.whitening.flow, &self.options.common);
         let length = self.options.correlation_length.filter(|length| *length > 0.0);
@@ -300,7 +300,7 @@ fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
     if known.many {
         return vec![refine(inliers, known.motion, None, StoppingCriteria::NONE)];
     }
-    let others = known.rivals.iter().filter(|rival| !rival.others).map(|rival| rival.motion);
+    let others = known.competing.iter().filter(|competitor| !competitor.others).map(|competitor| competitor.motion);
     let motions: Vec<Motion> = std::iter::once(known.motion).chain(others).collect();
     different(
         motions.into_par_iter().map(|motion| refine(inliers, motion, None, StoppingCriteria::of(inliers.n))).collect(),

@@ -209,8 +209,8 @@ pub(crate) fn with_all_inliers(mut found: MotionEstimate, all: &Observations, ke
 pub(crate) fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
     let doubtful = kept.doubtful;
     let few = match found.status {
-        Status::Ok => doubtful || robust::hangs_on_few(all, &found),
-        Status::RotationOnly => doubtful && !(kept.whole && robust::one_noise(&found.residuals)),
+        Status::Ok => doubtful || robust::has_high_leverage(all, &found),
+        Status::RotationOnly => doubtful && !(kept.single_noise && robust::one_noise(&found.residuals)),
         Status::LowSnr => doubtful,
         _ => false,
     };

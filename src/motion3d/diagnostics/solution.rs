@@ -11,7 +11,7 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::model::result::{Alternative, CommonEffect, Likelihood, Moved, Status, UNKNOWN, axes, nested};
 use crate::motion3d::model::rows::Matrix5;
-use crate::motion3d::robust::{Consensus, Told, among_strays};
+use crate::motion3d::robust::{Consensus, EstimatedMotion, weighted_by_posterior};
 use crate::motion3d::solver::covariance::{PluginCovariances, inverse};
 use crate::motion3d::solver::efficient::{Efficient, nonlinearity_covariance};
 use crate::motion3d::solver::likelihood::Candidate;
@@ -82,11 +82,11 @@ impl Solution {
 
     /// Takes into account that some of the inliers are so by chance. Where depths are `given` for the
     /// weights, which may be wrong, the motion stays.
-    pub fn among_strays(&mut self, all: &Observations, known: &Consensus, given: bool) {
+    pub fn weighted_by_posterior(&mut self, all: &Observations, known: &Consensus, given: bool) {
         let Some(covariance) = self.covariance else { return };
-        let from = Told { motion: self.motion, tangent: self.tangent, covariance };
+        let from = EstimatedMotion { motion: self.motion, tangent: self.tangent, covariance };
         let smooth = self.smooth.as_deref().filter(|_| !given);
-        let Some(told) = among_strays(all, known, &from, smooth, !given) else { return };
+        let Some(told) = weighted_by_posterior(all, known, &from, smooth, !given) else { return };
         (self.motion, self.tangent) = (told.motion, told.tangent);
         self.covariance = Some(told.covariance);
     }

@@ -10,7 +10,7 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::result::{Alternative, Status};
 use crate::motion3d::model::rows::{Matrix5, tangents};
 use crate::motion3d::model::whitening::Whitening;
-use crate::motion3d::robust::Rival;
+use crate::motion3d::robust::CompetingMotion;
 use crate::motion3d::solver::covariance::direction_deviation;
 use crate::motion3d::solver::likelihood::SAME;
 use crate::motion3d::solver::starts::{SEARCHED, sample};
@@ -61,7 +61,7 @@ pub(crate) struct Evidence<'a> {
     /// Whether the noise is what the motion leaves.
     pub unknown: bool,
     /// Motions of other points.
-    pub rivals: &'a [Rival],
+    pub competing: &'a [CompetingMotion],
     /// Another solution that is about as likely.
     pub undecided: Option<Alternative>,
 }
@@ -86,12 +86,12 @@ pub(crate) fn judge(
         solution.alternatives.retain(|known| known.motion.angle_to(&other.motion) > distinct);
         solution.alternatives.insert(0, other);
     }
-    let others = evidence.rivals.iter().filter(|rival| rival.others);
+    let others = evidence.competing.iter().filter(|competitor| competitor.others);
     let same = if deviation.is_finite() { deviation.max(SAME) } else { SAME };
-    for (place, rival) in others.clone().enumerate() {
-        solution.alternatives.retain(|known| known.motion.angle_to(&rival.motion).to_degrees() > same);
+    for (place, competitor) in others.clone().enumerate() {
+        solution.alternatives.retain(|known| known.motion.angle_to(&competitor.motion).to_degrees() > same);
         let place = place.min(solution.alternatives.len());
-        solution.alternatives.insert(place, Alternative { motion: rival.motion, excess: rival.excess });
+        solution.alternatives.insert(place, Alternative { motion: competitor.motion, excess: competitor.excess });
     }
     once(&mut solution.alternatives);
     let motions = [solution.motion, evidence.likelihood.0];

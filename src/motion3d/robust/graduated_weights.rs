@@ -17,12 +17,12 @@ const NARROWING: f64 = 1.6;
 
 /// The same points, with rounder noise first: where it is far from round the valleys are too narrow for the
 /// search.
-pub(crate) struct Narrowing<'a> {
+pub(crate) struct GraduatedWeights<'a> {
     rounder: Vec<Observations>,
     own: &'a Observations,
 }
 
-impl<'a> Narrowing<'a> {
+impl<'a> GraduatedWeights<'a> {
     pub fn new(own: &'a Observations) -> Self {
         Self { rounder: own.rounder(), own }
     }

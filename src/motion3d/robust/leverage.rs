@@ -18,7 +18,7 @@ const MANY: usize = 300;
 const SURE: f64 = 0.95;
 
 /// By how much the deviation may grow without the points that may be outliers.
-const MOST: f64 = 2.0;
+const MAX_GROWTH: f64 = 2.0;
 
 use crate::motion3d::model::rows::Vector5;
 /// Whether the direction's deviation would more than double without the inliers that tell most of it, of as
@@ -26,7 +26,7 @@ use crate::motion3d::model::rows::Vector5;
 ///
 /// Outliers spread evenly have twice the median residual of the rejected as their range; `3 / (2 median)` of
 /// them fall within three deviations.
-pub(crate) fn hangs_on_few(observations: &Observations, found: &MotionEstimate) -> bool {
+pub(crate) fn has_high_leverage(observations: &Observations, found: &MotionEstimate) -> bool {
     let inliers: Vec<usize> = (0..observations.n).filter(|&k| found.inliers[observations.source[k] as usize]).collect();
     let rejected = observations.n - inliers.len();
     if rejected == 0 || inliers.len() >= MANY {
@@ -40,10 +40,10 @@ pub(crate) fn hangs_on_few(observations: &Observations, found: &MotionEstimate) 
 
 /// The share of outliers that obey a motion by chance, as far as their epipolar lines go: that of those
 /// evenly spread over twice the median residual of the rejected.
-fn chance(observations: &Observations, motion: &Motion, obeys: impl Fn(usize) -> bool) -> f64 {
+fn chance(observations: &Observations, motion: &Motion, is_inlier: impl Fn(usize) -> bool) -> f64 {
     let seen = depths(observations, motion);
     let mut sizes: Vec<f64> =
-        (0..observations.n).filter(|&k| !obeys(k)).map(|k| seen.e[k].abs() / observations.own()).collect();
+        (0..observations.n).filter(|&k| !is_inlier(k)).map(|k| seen.e[k].abs() / observations.own()).collect();
     INLIER / (2.0 * median(&mut sizes).unwrap_or(0.0).max(INLIER))
 }
 
@@ -83,7 +83,7 @@ fn grows(rows: &[Vector5], observations: &Observations, suspects: usize) -> bool
     }
     let Some(mut covariance) = inverse(&information) else { return true };
     let trace = |covariance: &Matrix5| covariance[(0, 0)] + covariance[(1, 1)];
-    let limit = MOST * MOST * trace(&covariance);
+    let limit = MAX_GROWTH * MAX_GROWTH * trace(&covariance);
     let mut left: Vec<&Vector5> = rows.iter().collect();
     for _ in 0..suspects.min(rows.len()) {
         // Without a row: `C + C d d^t C / (1 - d^t C d)`.

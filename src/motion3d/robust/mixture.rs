@@ -1,16 +1,16 @@
-//! The last steps towards the motion among points of which some are strays.
+//! The last steps towards the motion among points of which some are outliers.
 //!
 //! With the probability `g(e)` of each point that it is an inlier
-//! ([`strays`](crate::motion3d::robust::outlier_posterior)), the estimating
-//! equation is `sum g(e) e D(nu~)^t = 0`. Strays spread evenly add nothing to its mean, and nothing to its
+//! ([`outliers`](crate::motion3d::robust::outlier_posterior)), the estimating
+//! equation is `sum g(e) e D(nu~)^t = 0`. Outliers spread evenly add nothing to its mean, and nothing to its
 //! slope: when the motion moves, so does what of them obeys. So the slope is that of the inliers alone, the
 //! mean of `g e^2 D^t D` by parts, while the squares of `g e D` are those of all points: their mean is the
-//! same, as it is for every likelihood. Least squares on a fixed set of points take strays for inliers that
+//! same, as it is for every likelihood. Least squares on a fixed set of points take outliers for inliers that
 //! tell of the motion.
 
-use super::depth_consistency::{Gate, Judged};
-use super::outlier_posterior::{Strays, normal};
-use super::{Consensus, INLIER, LEAST, obeying};
+use super::depth_consistency::{DepthConsistency, Judged};
+use super::outlier_posterior::{OutlierPosterior, normal};
+use super::{Consensus, INLIER, MIN_POINTS, inliers_of};
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{CHUNK, Observations};
@@ -37,7 +37,7 @@ const SETTLED: f64 = 1e-3;
 use crate::motion3d::model::rows::Vector5;
 /// A motion with its covariance in the axes `tangent`.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Told {
+pub(crate) struct EstimatedMotion {
     pub motion: Motion,
     pub tangent: Matrix2x3<f64>,
     pub covariance: Matrix5,
@@ -57,9 +57,9 @@ struct Sums {
 /// Points and depths that weigh the equation.
 struct Among<'a> {
     all: &'a Observations,
-    strays: &'a Strays,
+    outliers: &'a OutlierPosterior,
     /// Points with hardly a rejected neighbour, which alone count; `None`: all do.
-    quiet: Option<&'a [bool]>,
+    has_inlier_neighbours: Option<&'a [bool]>,
     /// `nu~` by point, NaN where that is not known; `None`: the points' own.
     smooth: Option<Vec<f64>>,
     /// For points without one.
@@ -68,11 +68,11 @@ struct Among<'a> {
 
 impl Among<'_> {
     /// What one point adds at a motion, with the depth its row has.
-    fn add(&self, sums: &mut Sums, at: &Told, k: usize, spread: f64) {
-        if self.quiet.is_some_and(|quiet| !quiet[k]) {
+    fn add(&self, sums: &mut Sums, at: &EstimatedMotion, k: usize, spread: f64) {
+        if self.has_inlier_neighbours.is_some_and(|has_inlier_neighbours| !has_inlier_neighbours[k]) {
             return;
         }
-        let Some(odds) = self.strays.of(k) else { return };
+        let Some(odds) = self.outliers.of(k) else { return };
         let row = self.all.row(k);
         let t = row.g * at.motion.u();
         let s2 = t.norm_squared();
@@ -91,16 +91,22 @@ impl Among<'_> {
         let (turn, spin) = (at.tangent * row.g.transpose() * p * nu, row.r.transpose() * p);
         let row_of = Vector5::new(turn.x, turn.y, spin.x, spin.y, spin.z);
         let density = normal(e / own);
-        let inlier = density / (density + odds.strays);
+        let inlier = density / (density + odds.outliers);
         let damping = s2 / (s2 + 0.5 * row.g.norm_squared() * spread);
         sums.force += row_of * (damping * inlier * e);
-        let information = row_of * row_of.transpose() * (inlier * odds.told);
+        let information = row_of * row_of.transpose() * (inlier * odds.information);
         sums.slope += information * damping;
         sums.information += information;
     }
 
     /// Newton's steps to the root; `None` where they lead to something else.
-    fn root(&self, from: &Told, first: &Sums, spread: f64, farthest: f64) -> Option<(Told, Sums)> {
+    fn root(
+        &self,
+        from: &EstimatedMotion,
+        first: &Sums,
+        spread: f64,
+        farthest: f64,
+    ) -> Option<(EstimatedMotion, Sums)> {
         let (mut at, mut sums, mut moved) = (*from, *first, 0.0);
         for _ in 0..STEPS {
             let change = sums.slope.cholesky()?.solve(&sums.force);
@@ -116,7 +122,7 @@ impl Among<'_> {
             at.tangent = tangents(&at.motion.u());
             // So short a step changes the information by no more than it is known.
             if square < STEP {
-                sums.information = turned(&sums.information, &(at.tangent * before.transpose()));
+                sums.information = in_axes(&sums.information, &(at.tangent * before.transpose()));
                 return Some((at, sums));
             }
             sums = self.sums(&at, spread);
@@ -124,7 +130,7 @@ impl Among<'_> {
         None
     }
 
-    fn sums(&self, at: &Told, spread: f64) -> Sums {
+    fn sums(&self, at: &EstimatedMotion, spread: f64) -> Sums {
         let chunk = |chunk: usize| {
             let mut sums = Sums::default();
             (chunk * CHUNK..((chunk + 1) * CHUNK).min(self.all.n)).for_each(|k| self.add(&mut sums, at, k, spread));
@@ -151,40 +157,45 @@ impl Among<'_> {
 
 /// From the motion of the inner inliers, with the depths `smooth` of these in its weights (`None`: their
 /// own), to the root of the equation with probabilities, if it `moves`; the covariance grows as the
-/// information shrinks. `None` where nothing is known of strays.
-pub(crate) fn among_strays(
+/// information shrinks. `None` where nothing is known of outliers.
+pub(crate) fn weighted_by_posterior(
     all: &Observations,
     known: &Consensus,
-    from: &Told,
+    from: &EstimatedMotion,
     smooth: Option<&[f64]>,
     moves: bool,
-) -> Option<Told> {
-    let strays = known.strays.as_ref()?;
+) -> Option<EstimatedMotion> {
+    let outliers = known.outliers.as_ref()?;
     let before = plain(all, known, from, smooth)?;
     let spread = direction_spread(&inverse(&before)?);
-    let among = Among::new(all, known, strays, smooth);
+    let among = Among::new(all, known, outliers, smooth);
     let first = among.sums(from, spread);
     let (at, sums) =
         if moves { among.root(from, &first, spread, FARTHEST).unwrap_or((*from, first)) } else { (*from, first) };
     let axes = at.tangent * from.tangent.transpose();
-    Some(Told { covariance: scaled(&from.covariance, &before, &sums.information, &axes)?, ..at })
+    Some(EstimatedMotion { covariance: scaled(&from.covariance, &before, &sums.information, &axes)?, ..at })
 }
 
 /// From a motion that was found by least squares to the root of the equation with probabilities, points
 /// judged anew on the way; with its cost. `None` where too few obey.
 ///
-/// Strays with depths of their own, which are large, weigh most in least squares; drawn to their neighbours'
+/// Outliers with depths of their own, which are large, weigh most in least squares; drawn to their neighbours'
 /// they weigh as inliers do.
-pub(crate) fn softened(all: &Observations, gate: &Gate<'_>, start: Motion) -> Option<(Motion, f64)> {
+pub(crate) fn refined_by_posterior(
+    all: &Observations,
+    gate: &DepthConsistency<'_>,
+    start: Motion,
+) -> Option<(Motion, f64)> {
     let mut motion = start;
     for round in 0..=ROUNDS {
-        let inliers = obeying(all, &motion);
-        let Judged { strays, smooth, cost } = gate.judged(&motion, &inliers).filter(|_| inliers.len() >= LEAST)?;
+        let inliers = inliers_of(all, &motion);
+        let Judged { outliers, smooth, cost } =
+            gate.judged(&motion, &inliers).filter(|_| inliers.len() >= MIN_POINTS)?;
         if round == ROUNDS {
             return Some((motion, cost));
         }
-        let among = Among { all, strays: &strays, quiet: None, smooth: Some(smooth), usual: 0.0 };
-        let at = Told { motion, tangent: tangents(&motion.u()), covariance: Matrix5::zeros() };
+        let among = Among { all, outliers: &outliers, has_inlier_neighbours: None, smooth: Some(smooth), usual: 0.0 };
+        let at = EstimatedMotion { motion, tangent: tangents(&motion.u()), covariance: Matrix5::zeros() };
         let spread = direction_spread(&inverse(&among.sums(&at, 0.0).information)?);
         let Some((next, _)) = among.root(&at, &among.sums(&at, spread), spread, f64::INFINITY) else {
             return Some((motion, cost));
@@ -199,7 +210,7 @@ pub(crate) fn softened(all: &Observations, gate: &Gate<'_>, start: Motion) -> Op
 }
 
 /// `sum D^t D` of the inner inliers, all of which least squares take for such.
-fn plain(all: &Observations, known: &Consensus, at: &Told, smooth: Option<&[f64]>) -> Option<Matrix5> {
+fn plain(all: &Observations, known: &Consensus, at: &EstimatedMotion, smooth: Option<&[f64]>) -> Option<Matrix5> {
     let inner = all.subset(&known.inner);
     let own;
     let nu = if let Some(smooth) = smooth {
@@ -213,7 +224,7 @@ fn plain(all: &Observations, known: &Consensus, at: &Told, smooth: Option<&[f64]
 }
 
 /// A matrix of `(psi, w)` in other axes of `psi`.
-fn turned(matrix: &Matrix5, axes: &Matrix2<f64>) -> Matrix5 {
+fn in_axes(matrix: &Matrix5, axes: &Matrix2<f64>) -> Matrix5 {
     let mut into = Matrix5::identity();
     into.fixed_view_mut::<2, 2>(0, 0).copy_from(axes);
     into * matrix * into.transpose()
@@ -222,14 +233,19 @@ fn turned(matrix: &Matrix5, axes: &Matrix2<f64>) -> Matrix5 {
 /// The covariance after the information went from `before` to `after`, whatever else it accounts for in
 /// proportion; `axes` turn those of the direction.
 fn scaled(covariance: &Matrix5, before: &Matrix5, after: &Matrix5, axes: &Matrix2<f64>) -> Option<Matrix5> {
-    let (before, covariance) = (turned(before, axes), turned(covariance, axes));
+    let (before, covariance) = (in_axes(before, axes), in_axes(covariance, axes));
     let grown = after.cholesky()?.l().transpose().try_inverse()? * before.cholesky()?.l().transpose();
     let covariance = grown * covariance * grown.transpose();
     Some(0.5 * (covariance + covariance.transpose()))
 }
 
 impl<'a> Among<'a> {
-    fn new(all: &'a Observations, known: &'a Consensus, strays: &'a Strays, smooth: Option<&[f64]>) -> Self {
+    fn new(
+        all: &'a Observations,
+        known: &'a Consensus,
+        outliers: &'a OutlierPosterior,
+        smooth: Option<&[f64]>,
+    ) -> Self {
         let (mut sum, mut by_point) = (0.0, None);
         if let Some(smooth) = smooth {
             let mut values = vec![f64::NAN; all.n];
@@ -239,7 +255,7 @@ impl<'a> Among<'a> {
             }
             by_point = Some(values);
         }
-        let quiet = known.quiet.as_deref();
-        Self { all, strays, quiet, smooth: by_point, usual: sum / known.inner.len().max(1) as f64 }
+        let has_inlier_neighbours = known.has_inlier_neighbours.as_deref();
+        Self { all, outliers, has_inlier_neighbours, smooth: by_point, usual: sum / known.inner.len().max(1) as f64 }
     }
 }

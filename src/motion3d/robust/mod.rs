@@ -21,13 +21,13 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Scaled};
 use crate::motion3d::solver::refine::{FEWER, MANY, StoppingCriteria, refine};
 use crate::motion3d::solver::starts::sample;
-use competing_motions::{among_many_strays, rivals, second};
-use depth_consistency::Gate;
-use graduated_weights::Narrowing;
-pub(crate) use leverage::hangs_on_few;
-pub(crate) use mixture::{Told, among_strays};
+use competing_motions::{among_many_outliers, competing_motions, second};
+use depth_consistency::DepthConsistency;
+use graduated_weights::GraduatedWeights;
+pub(crate) use leverage::has_high_leverage;
+pub(crate) use mixture::{EstimatedMotion, weighted_by_posterior};
 pub(crate) use noise_scale::larger;
-use outlier_posterior::Strays;
+use outlier_posterior::OutlierPosterior;
 pub(crate) use single_noise::one_noise;
 
 /// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be
@@ -44,15 +44,15 @@ const ROUNDS: usize = 10;
 /// Times that the depth gate closes.
 const GATES: usize = 2;
 
-/// The share of strays among those that obey from which on they matter for the search.
+/// The share of outliers among those that obey from which on they matter for the search.
 const MATTER: f64 = 0.03;
 
-/// From which share on the motions of few points are not known: which of them are strays decides between
+/// From which share on the motions of few points are not known: which of them are outliers decides between
 /// directions far apart, whose residuals and depths are as likely.
 const DOUBT: f64 = 0.1;
 
 /// Fewest points that a motion is found from.
-const LEAST: usize = 5;
+const MIN_POINTS: usize = 5;
 
 /// Two motions of different points of which neither has a tenth of all points more than the other: which is
 /// the scene's cannot be told.
@@ -87,17 +87,17 @@ pub(crate) struct Consensus {
     pub inner: Vec<u32>,
     /// Other motions that about as many points obey, and how much more each costs, in squared units of noise;
     /// the best first.
-    pub rivals: Vec<Rival>,
+    pub competing: Vec<CompetingMotion>,
     /// Whether the points are too few to tell outliers from large noise.
     pub doubtful: bool,
     /// Whether, of few points in unknown noise, one noise of all of them is the shorter description.
-    pub whole: bool,
-    /// Whether so many strays obey that least squares on all that obey would follow them.
+    pub single_noise: bool,
+    /// Whether so many outliers obey that least squares on all that obey would follow them.
     pub many: bool,
-    /// How likely points are strays that obey by chance; `None` where nothing is known of that.
-    pub strays: Option<Strays>,
+    /// How likely points are outliers that obey by chance; `None` where nothing is known of that.
+    pub outliers: Option<OutlierPosterior>,
     /// Points, obeying or not, with hardly a rejected neighbour; all of them, where that was not asked.
-    pub quiet: Option<Vec<bool>>,
+    pub has_inlier_neighbours: Option<Vec<bool>>,
 }
 
 impl Consensus {
@@ -106,19 +106,19 @@ impl Consensus {
             motion,
             inliers,
             inner: Vec::new(),
-            rivals: Vec::new(),
+            competing: Vec::new(),
             doubtful: false,
-            whole: false,
+            single_noise: false,
             many: false,
-            strays: None,
-            quiet: None,
+            outliers: None,
+            has_inlier_neighbours: None,
         }
     }
 }
 
 /// Another motion of many points.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rival {
+pub(crate) struct CompetingMotion {
     pub motion: Motion,
     pub excess: f64,
     /// Whether points obey it that do not obey the motion that was chosen: those of another thing. Else it is
@@ -129,18 +129,19 @@ pub(crate) struct Rival {
 /// The motion that most points obey, and others that it may be. Where the noise is not known it is estimated,
 /// and the points are measured in it afterwards.
 pub(crate) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
-    let found = obeyed(scaled, rng)?;
+    let found = with_noise(scaled, rng)?;
     Some(with_doubts(&scaled.observations, found, rng))
 }
 
-fn obeyed(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+fn with_noise(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     if !scaled.unknown {
         return in_known_noise(&scaled.observations, rng);
     }
-    let whole = (scaled.observations.n < SELECTED).then(|| single_noise::sigma(&scaled.observations, rng)).flatten();
-    let whole = whole.map(|sigma| sigma * scaled.sigma);
+    let single_noise =
+        (scaled.observations.n < SELECTED).then(|| single_noise::noise_std(&scaled.observations, rng)).flatten();
+    let single_noise = single_noise.map(|sigma| sigma * scaled.sigma);
     let found = noise_scale::consensus(scaled, rng)?;
-    let Some(sigma) = whole.map(|sigma| sigma / scaled.sigma) else { return Some(found) };
+    let Some(sigma) = single_noise.map(|sigma| sigma / scaled.sigma) else { return Some(found) };
     let shorter = single_noise::shortening(&scaled.observations, &found, sigma);
     // Whatever is the case, one noise that hardly differs from the other does no harm.
     let (n, k) = (scaled.observations.n, found.inliers.len());
@@ -148,7 +149,7 @@ fn obeyed(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     if shorter < WORTH {
         scaled.take(sigma);
         let found = in_known_noise(&scaled.observations, rng)?;
-        return Some(Consensus { doubtful: doubtful || found.doubtful, whole: shorter < -LONGER, ..found });
+        return Some(Consensus { doubtful: doubtful || found.doubtful, single_noise: shorter < -LONGER, ..found });
     }
     Some(Consensus { doubtful: doubtful || found.doubtful, ..found })
 }
@@ -158,41 +159,41 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
     let on = fewer.as_ref().unwrap_or(observations);
     let candidates = candidates(on, rng)?;
     let &(best, _) = candidates.first()?;
-    let mut rivals = rivals(on, &candidates);
+    let mut competing = competing_motions(on, &candidates);
     let mut found = settle(observations, best)?;
-    let gate = Gate::new(observations);
+    let gate = DepthConsistency::new(observations);
     for _ in 0..GATES {
         let (kept, _) = gate.passed(&found);
-        if kept.len() < LEAST {
+        if kept.len() < MIN_POINTS {
             break;
         }
         let motion =
             refine(&observations.subset(&kept), found.motion, None, StoppingCriteria::of(observations.n)).motion;
-        let obeying = obeying(observations, &motion);
-        found = Consensus::new(motion, obeying);
+        let fitted = inliers_of(observations, &motion);
+        found = Consensus::new(motion, fitted);
     }
-    let (mut inliers, mut strays) = gate.passed(&found);
-    let many = strays.as_ref().is_some_and(|strays| strays.share > MATTER);
-    if many && let Some((motion, others)) = among_many_strays(observations, on, &gate, &candidates) {
-        found = Consensus { many, ..Consensus::new(motion, obeying(observations, &motion)) };
-        (inliers, strays) = gate.passed(&found);
-        rivals = others;
-        let share = strays.as_ref().map_or(0.0, |strays| strays.share);
+    let (mut inliers, mut outliers) = gate.passed(&found);
+    let many = outliers.as_ref().is_some_and(|outliers| outliers.share > MATTER);
+    if many && let Some((motion, others)) = among_many_outliers(observations, on, &gate, &candidates) {
+        found = Consensus { many, ..Consensus::new(motion, inliers_of(observations, &motion)) };
+        (inliers, outliers) = gate.passed(&found);
+        competing = others;
+        let share = outliers.as_ref().map_or(0.0, |outliers| outliers.share);
         found.doubtful = share > DOUBT && observations.n < MANY;
     }
-    if inliers.len() >= LEAST {
+    if inliers.len() >= MIN_POINTS {
         found.inliers = inliers;
-        found.strays = strays;
+        found.outliers = outliers;
     }
-    found.rivals = rivals;
-    if found.inliers.len() < LEAST {
+    found.competing = competing;
+    if found.inliers.len() < MIN_POINTS {
         return None;
     }
     found.inner.clone_from(&found.inliers);
     if let Some(inner) = moving_objects::inner(observations, &found) {
         found.inner = inner.inliers;
-        found.quiet = inner.quiet;
-        found.rivals.extend(inner.rival);
+        found.has_inlier_neighbours = inner.has_inlier_neighbours;
+        found.competing.extend(inner.competitor);
     }
     Some(found)
 }
@@ -209,10 +210,10 @@ fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRn
     // Residuals that are cut off where noise told too small ends pull nowhere.
     let variance = larger(observations, &found.motion);
     on.rescale(variance.sqrt().recip());
-    let shown = if inner && variance <= 1.0 { found.inner.clone() } else { obeying(&on, &found.motion) };
-    let instead = residual_structure::instead(&on, &found.motion, &shown, rng);
-    let instead = instead.map(|other| Rival { excess: other.excess * variance, ..other });
-    found.rivals.extend(instead);
+    let shown = if inner && variance <= 1.0 { found.inner.clone() } else { inliers_of(&on, &found.motion) };
+    let instead = residual_structure::competing_motion(&on, &found.motion, &shown, rng);
+    let instead = instead.map(|other| CompetingMotion { excess: other.excess * variance, ..other });
+    found.competing.extend(instead);
     found
 }
 
@@ -223,7 +224,7 @@ fn first_asked(observations: &Observations, rng: CounterRng) -> Option<Observati
 
 /// Motions that many points obey, with what each costs: the cheapest first.
 fn candidates(observations: &Observations, rng: CounterRng) -> Option<Vec<(Motion, f64)>> {
-    let found = Narrowing::new(observations).motions(STARTS, rng);
+    let found = GraduatedWeights::new(observations).motions(STARTS, rng);
     let mut all: Vec<(Motion, f64)> = found.into_iter().map(|motion| cheaper_sign(observations, motion)).collect();
     all.sort_by(|a, b| a.1.total_cmp(&b.1));
     all.extend(second(observations, all.first()?.0, rng.stream(10)));
@@ -238,25 +239,25 @@ fn cheaper_sign(observations: &Observations, motion: Motion) -> (Motion, f64) {
 }
 
 /// Points within three deviations of their epipolar line and of the half space before the camera.
-fn obeying(observations: &Observations, motion: &Motion) -> Vec<u32> {
+fn inliers_of(observations: &Observations, motion: &Motion) -> Vec<u32> {
     let seen = depths(observations, motion);
-    let obeys = |&k: &u32| {
+    let is_inlier = |&k: &u32| {
         let k = k as usize;
         seen.e[k].abs() < INLIER && seen.nu[k] * seen.s2[k].sqrt() > -INLIER
     };
-    (0..observations.n as u32).filter(obeys).collect()
+    (0..observations.n as u32).filter(is_inlier).collect()
 }
 
 /// Maximum likelihood on the points that obey, until these stay the same.
 fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
     let mut motion = start;
-    let mut inliers = obeying(observations, &motion);
+    let mut inliers = inliers_of(observations, &motion);
     for _ in 0..ROUNDS {
-        if inliers.len() < LEAST {
+        if inliers.len() < MIN_POINTS {
             return None;
         }
         motion = refine(&observations.subset(&inliers), motion, None, StoppingCriteria::of(observations.n)).motion;
-        let next = obeying(observations, &motion);
+        let next = inliers_of(observations, &motion);
         // Of many points a few always lie on the border.
         let settled =
             next == inliers || (observations.n > MANY && next.len().abs_diff(inliers.len()) * 1000 < observations.n);
@@ -265,5 +266,5 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
             break;
         }
     }
-    (inliers.len() >= LEAST).then_some(Consensus::new(motion, inliers))
+    (inliers.len() >= MIN_POINTS).then_some(Consensus::new(motion, inliers))
 }

@@ -1,7 +1,7 @@
 //! Things that move by themselves are whole: points among them that obey the scene's motion by chance pull it
 //! towards theirs.
 
-use super::{Consensus, LEAST, MANY, Rival, obeying};
+use super::{CompetingMotion, Consensus, MANY, MIN_POINTS, inliers_of};
 use crate::math::median;
 use crate::motion3d::kernels::equations;
 use crate::motion3d::model::motion::Motion;
@@ -14,7 +14,7 @@ use std::ops::Range;
 
 /// Neighbours that are looked at; points from which on there are enough of them.
 const NEAREST: usize = 16;
-const ENOUGH: usize = 64;
+const MIN_WITH_NEIGHBOURS: usize = 64;
 
 /// Deviations by which rejected neighbours must be more than usual.
 const MORE: f64 = 3.0;
@@ -49,20 +49,20 @@ impl Around {
     }
 
     /// The share of each point's neighbours that do not obey.
-    fn rejected(&self, obeys: &[bool]) -> Vec<f64> {
-        let mut shares = vec![0.0; obeys.len()];
+    fn rejected(&self, is_inlier: &[bool]) -> Vec<f64> {
+        let mut shares = vec![0.0; is_inlier.len()];
         match self {
             Self::Nearest(tree, lists) => {
                 for (place, &k) in tree.order().iter().enumerate() {
                     let near = lists.of(place);
-                    let out = near.iter().filter(|&&near| !obeys[tree.order()[near as usize] as usize]).count();
+                    let out = near.iter().filter(|&&near| !is_inlier[tree.order()[near as usize] as usize]).count();
                     shares[k as usize] = out as f64 / near.len() as f64;
                 }
             }
             Self::Cells(tree, cells) => {
                 for cell in cells {
                     let members = &tree.order()[cell.clone()];
-                    let out = members.iter().filter(|&&k| !obeys[k as usize]).count();
+                    let out = members.iter().filter(|&&k| !is_inlier[k as usize]).count();
                     for &k in members {
                         shares[k as usize] = out as f64 / members.len() as f64;
                     }
@@ -79,30 +79,30 @@ pub(crate) struct Inner {
     pub inliers: Vec<u32>,
     /// The motion of all inliers (where few would be left: of those few), if it is another one: then points
     /// on the border of a thing belong to that.
-    pub rival: Option<Rival>,
+    pub competitor: Option<CompetingMotion>,
     /// Points with hardly a rejected neighbour; `None` where few would be left.
-    pub quiet: Option<Vec<bool>>,
+    pub has_inlier_neighbours: Option<Vec<bool>>,
 }
 
 /// The share of the inliers that must be left.
-const LEFT: f64 = 0.5;
+const MIN_LEFT: f64 = 0.5;
 
 /// Looks at the neighbours of the inliers; `None` where that leaves all of them.
 pub(crate) fn inner(observations: &Observations, found: &Consensus) -> Option<Inner> {
-    if observations.n < ENOUGH {
+    if observations.n < MIN_WITH_NEIGHBOURS {
         return None;
     }
     let around = Around::new(observations);
-    let (motion, fewer, quiet) = without(observations, found, &around);
+    let (motion, fewer, has_inlier_neighbours) = without(observations, found, &around);
     if fewer.len() == found.inliers.len() {
         return None;
     }
     let differ = differ(observations, found, &motion, &fewer).unwrap_or(false);
-    let enough = fewer.len() as f64 >= LEFT * found.inliers.len() as f64;
+    let enough = fewer.len() as f64 >= MIN_LEFT * found.inliers.len() as f64;
     let other = if enough { found.motion } else { motion };
-    let rival = differ.then_some(Rival { motion: other, excess: 0.0, others: true });
+    let competitor = differ.then_some(CompetingMotion { motion: other, excess: 0.0, others: true });
     let inliers = if enough { fewer } else { found.inliers.clone() };
-    Some(Inner { inliers, rival, quiet: enough.then_some(quiet) })
+    Some(Inner { inliers, competitor, has_inlier_neighbours: enough.then_some(has_inlier_neighbours) })
 }
 
 /// From which share of rejected neighbours on there are more than is usual among these; reorders them.
@@ -116,26 +116,26 @@ pub(crate) fn more_than_usual(shares: &mut [f64]) -> f64 {
 /// and which points have no larger one.
 fn without(observations: &Observations, found: &Consensus, around: &Around) -> (Motion, Vec<u32>, Vec<bool>) {
     let (mut motion, mut inliers) = (found.motion, found.inliers.clone());
-    let mut quiet = vec![true; observations.n];
+    let mut has_inlier_neighbours = vec![true; observations.n];
     for _ in 0..ROUNDS {
-        let obeying = obeying(observations, &motion);
-        let obeying: Vec<u32> = obeying.into_iter().filter(|k| found.inliers.binary_search(k).is_ok()).collect();
-        let mut obeys = vec![false; observations.n];
-        for &k in &obeying {
-            obeys[k as usize] = true;
+        let fitted = inliers_of(observations, &motion);
+        let fitted: Vec<u32> = fitted.into_iter().filter(|k| found.inliers.binary_search(k).is_ok()).collect();
+        let mut is_inlier = vec![false; observations.n];
+        for &k in &fitted {
+            is_inlier[k as usize] = true;
         }
-        let rejected = around.rejected(&obeys);
-        let mut shares: Vec<f64> = obeying.iter().map(|&k| rejected[k as usize]).collect();
+        let rejected = around.rejected(&is_inlier);
+        let mut shares: Vec<f64> = fitted.iter().map(|&k| rejected[k as usize]).collect();
         let limit = more_than_usual(&mut shares);
-        let kept: Vec<u32> = obeying.into_iter().filter(|&k| rejected[k as usize] <= limit).collect();
-        if kept == inliers || kept.len() < LEAST {
+        let kept: Vec<u32> = fitted.into_iter().filter(|&k| rejected[k as usize] <= limit).collect();
+        if kept == inliers || kept.len() < MIN_POINTS {
             break;
         }
         motion = refine(&observations.subset(&kept), motion, None, StoppingCriteria::of(observations.n)).motion;
         inliers = kept;
-        quiet = rejected.iter().map(|&share| share <= limit).collect();
+        has_inlier_neighbours = rejected.iter().map(|&share| share <= limit).collect();
     }
-    (motion, inliers, quiet)
+    (motion, inliers, has_inlier_neighbours)
 }
 
 /// Whether the motion of `fewer` points differs from that of all inliers by more than their lower number

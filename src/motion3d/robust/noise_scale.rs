@@ -4,7 +4,7 @@
 //! at the noise and one at which both motions pass for one in larger noise. Residuals of a thing have the
 //! same sign as their neighbours', which those of noise do not.
 
-use super::residual_autocorrelation::alike;
+use super::residual_autocorrelation::is_autocorrelated;
 use super::{Consensus, UNKNOWNS, in_known_noise};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::depths;
@@ -27,7 +27,7 @@ const ROUNDS: usize = 4;
 const STEPS: usize = 50;
 
 /// The share of the inliers in larger noise that those in smaller noise must be.
-const MOST: f64 = 0.5;
+const MIN_INLIER_SHARE: f64 = 0.5;
 
 /// The motion that most points obey in the noise that they leave; points are measured in that afterwards.
 pub(crate) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
@@ -36,9 +36,10 @@ pub(crate) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
     for share in FIRST_SHARES {
         scaled.take(share * flow / scaled.sigma);
         let Some(found) = fixed_point(scaled, rng) else { break };
-        let enough =
-            larger.as_ref().is_none_or(|(one, _)| found.inliers.len() as f64 > MOST * one.inliers.len() as f64);
-        if enough && !alike(&scaled.observations, &found.motion, &found.inliers) {
+        let enough = larger
+            .as_ref()
+            .is_none_or(|(one, _)| found.inliers.len() as f64 > MIN_INLIER_SHARE * one.inliers.len() as f64);
+        if enough && !is_autocorrelated(&scaled.observations, &found.motion, &found.inliers) {
             return Some(found);
         }
         if larger.is_none() {

@@ -1,6 +1,6 @@
-//! How likely a point that obeys is a stray that does so by chance, by how odd its depth is.
+//! How likely a point that obeys is a outlier that does so by chance, by how odd its depth is.
 //!
-//! Of points whose depths deviate alike, `h` inliers have residuals with the density `h phi(e)`, and strays,
+//! Of points whose depths deviate alike, `h` inliers have residuals with the density `h phi(e)`, and outliers,
 //! which know nothing of the motion, `b` in every unit of residual. Those a little farther from their
 //! epipolar lines than inliers are tell `b`; what is left of those that obey tells `h`. A point is an inlier
 //! with the probability `h phi(e) / (h phi(e) + b)`.
@@ -8,7 +8,7 @@
 use super::INLIER;
 use std::ops::Range;
 
-/// Residuals, in units of noise, from which strays are counted: hardly an inlier has so large a one.
+/// Residuals, in units of noise, from which outliers are counted: hardly an inlier has so large a one.
 pub(crate) const BAND: Range<f64> = 4.0..10.0;
 
 /// The share of inliers that have residuals beyond that, and a margin.
@@ -22,16 +22,16 @@ const SIZES: usize = 16;
 /// Bins of both signs.
 const BINS: usize = 2 * SIZES;
 
-/// The least odds of strays: one for a million of inliers.
-const LEAST: f64 = 1e-6;
+/// The least odds of outliers: one for a million of inliers.
+const MIN_ODDS: f64 = 1e-6;
 
 /// The bin of points that are in none.
 const NONE: u8 = u8::MAX;
 
-/// Bins from here on are odd enough to be left out where strays are the most of them.
+/// Bins from here on are odd enough to be left out where outliers are the most of them.
 const TAIL: usize = 4;
 
-/// How rarely, of all estimates, strays alone may make odd depths so many: each one that is kept wrongly
+/// How rarely, of all estimates, outliers alone may make odd depths so many: each one that is kept wrongly
 /// decides nearly alone.
 const RARE: f64 = 1e-3;
 
@@ -40,7 +40,7 @@ pub(crate) struct Bin {
     pub point: u32,
     /// Of its depth, in units of what is usual.
     pub deviation: f64,
-    pub obeys: bool,
+    pub is_inlier: bool,
     /// Whether it lies among points that do not obey.
     pub among: bool,
     /// Across the epipolar line, in units of noise.
@@ -50,20 +50,20 @@ pub(crate) struct Bin {
 /// What points of one bin are.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Odds {
-    /// `b / h`: strays in a unit of residual for every inlier; infinite where strays explain all of the
+    /// `b / h`: outliers in a unit of residual for every inlier; infinite where outliers explain all of the
     /// points.
-    pub strays: f64,
-    /// The information of an inlier's residual relative to that without strays, for each that obeys.
-    pub told: f64,
+    pub outliers: f64,
+    /// The information of an inlier's residual relative to that without outliers, for each that obeys.
+    pub information: f64,
 }
 
 /// The odds of all points.
 #[derive(Debug, Clone)]
-pub(crate) struct Strays {
+pub(crate) struct OutlierPosterior {
     bins: Vec<u8>,
     odds: [Odds; BINS],
     dropped: [bool; BINS],
-    /// The share of strays among all that obey and are not left out.
+    /// The share of outliers among all that obey and are not left out.
     pub share: f64,
 }
 
@@ -75,24 +75,24 @@ pub(crate) fn normal(e: f64) -> f64 {
 /// The share of a normal distribution within the limit of inliers.
 const WITHIN: f64 = 0.997_300_2;
 
-/// `int phi^2 e^2 / (phi + strays) de` over what obeys: the mean of `g e^2` of inliers, which by parts is the
+/// `int phi^2 e^2 / (phi + outliers) de` over what obeys: the mean of `g e^2` of inliers, which by parts is the
 /// mean slope of `g e`, jumps at the limit included, too.
-fn told(strays: f64) -> f64 {
+fn relative_information(outliers: f64) -> f64 {
     const STEPS: i32 = 60;
     let step = 2.0 * INLIER / f64::from(STEPS);
     let value = |i: i32| {
         let e = step * f64::from(i) - INLIER;
         let density = normal(e);
         let end = if i == 0 || i == STEPS { 0.5 } else { 1.0 };
-        end * density * density * e * e / (density + strays)
+        end * density * density * e * e / (density + outliers)
     };
     (0..=STEPS).map(value).sum::<f64>() * step / WITHIN
 }
 
-/// How often, of strays alone, at least `obeying` obey where `beside` and one that is yet unseen do not: each
+/// How often, of outliers alone, at least `obeying` obey where `beside` and one that is yet unseen do not: each
 /// obeys with the share that the strip of inliers has, `wider` times that of the band.
-fn by_chance(obeying: usize, beside: usize, wider: f64) -> f64 {
-    let (n, p) = (obeying + beside + 1, wider / (1.0 + wider));
+fn by_chance(fitted: usize, beside: usize, wider: f64) -> f64 {
+    let (n, p) = (fitted + beside + 1, wider / (1.0 + wider));
     // Terms of the binomial distribution, from all of them down to none of the others.
     let mut term = n as f64 * p.ln();
     let mut sum = 0.0;
@@ -114,12 +114,12 @@ fn bin(deviation: f64) -> usize {
     if deviation < 0.0 { SIZES + place } else { place }
 }
 
-impl Strays {
+impl OutlierPosterior {
     /// Counts points with residuals up to the end of the band; `far` of all `n` have residuals that no inlier
     /// has.
     pub fn new(n: usize, far: usize, points: impl Iterator<Item = Bin>) -> Self {
         let mut bins = vec![NONE; n];
-        let (mut obeying, mut beside) = ([0usize; BINS], [0usize; BINS]);
+        let (mut fitted, mut beside) = ([0usize; BINS], [0usize; BINS]);
         for point in points {
             let place = bin(point.deviation);
             // Those of a thing that moves by itself, which is whole, and not of a near one.
@@ -127,51 +127,51 @@ impl Strays {
                 continue;
             }
             bins[point.point as usize] = place as u8;
-            obeying[place] += usize::from(point.obeys);
+            fitted[place] += usize::from(point.is_inlier);
             beside[place] += usize::from(BAND.contains(&point.residual.abs()));
         }
         let any = far as f64 > BEYOND * n as f64;
         let wider = INLIER / (BAND.end - BAND.start);
-        let (mut odds, mut dropped) = ([Odds { strays: f64::INFINITY, told: 0.0 }; BINS], [false; BINS]);
-        let (mut left, mut left_strays) = (0.0, 0.0);
+        let (mut odds, mut dropped) = ([Odds { outliers: f64::INFINITY, information: 0.0 }; BINS], [false; BINS]);
+        let (mut left, mut left_outliers) = (0.0, 0.0);
         for place in 0..BINS {
             let odd = place % SIZES >= FIRST.len();
-            let (expected, count) = (beside[place] as f64 * wider, obeying[place] as f64);
-            let explained = any && by_chance(obeying[place], beside[place], wider) > RARE / BINS as f64;
+            let (expected, count) = (beside[place] as f64 * wider, fitted[place] as f64);
+            let explained = any && by_chance(fitted[place], beside[place], wider) > RARE / BINS as f64;
             let tail = place % SIZES >= TAIL;
             dropped[place] = odd && explained || tail && count < 2.0 * expected;
             let inliers = (count - expected) / WITHIN;
             if !dropped[place] && inliers > 0.0 {
                 // Where none was seen there may be one.
                 let unseen = if any { wider } else { 0.0 };
-                let strays = (expected + unseen) / (2.0 * INLIER) / inliers;
-                odds[place] = Odds { strays, told: told(strays) };
+                let outliers = (expected + unseen) / (2.0 * INLIER) / inliers;
+                odds[place] = Odds { outliers, information: relative_information(outliers) };
             }
             if !dropped[place] {
-                (left, left_strays) = (left + count, left_strays + expected.min(count));
+                (left, left_outliers) = (left + count, left_outliers + expected.min(count));
             }
         }
-        let share = if left > 0.0 { left_strays / left } else { 0.0 };
+        let share = if left > 0.0 { left_outliers / left } else { 0.0 };
         Self { bins, odds, dropped, share }
     }
 
-    /// Twice by how much, in nats, a point with the residual `e` is likelier among inliers and strays than
-    /// among strays alone.
+    /// Twice by how much, in nats, a point with the residual `e` is likelier among inliers and outliers than
+    /// among outliers alone.
     pub fn gain(&self, k: usize, e: f64) -> f64 {
-        self.of(k).map_or(0.0, |odds| 2.0 * (normal(e) / odds.strays.max(LEAST)).ln_1p())
+        self.of(k).map_or(0.0, |odds| 2.0 * (normal(e) / odds.outliers.max(MIN_ODDS)).ln_1p())
     }
 
-    /// Whether strays do not explain points like this one.
+    /// Whether outliers do not explain points like this one.
     pub fn keeps(&self, k: u32) -> bool {
         let bin = self.bins[k as usize];
         bin != NONE && !self.dropped[bin as usize]
     }
 
-    /// The odds of a point; `None` where it is farther from its line than any that was counted, or strays
+    /// The odds of a point; `None` where it is farther from its line than any that was counted, or outliers
     /// explain it.
     pub fn of(&self, k: usize) -> Option<Odds> {
         let bin = self.bins[k];
-        (bin != NONE).then(|| self.odds[bin as usize]).filter(|odds| odds.strays.is_finite())
+        (bin != NONE).then(|| self.odds[bin as usize]).filter(|odds| odds.outliers.is_finite())
     }
 }
 
@@ -188,29 +188,34 @@ mod tests {
         assert_eq!(bin(-2.5), SIZES + 4);
     }
 
-    /// A quarter of the variance is not told where strays are a third of what obeys; without strays only what
+    /// A quarter of the variance is not told where outliers are a third of what obeys; without outliers only what
     /// lies beyond the limit is missing.
     #[test]
     fn strays_take_information_away() {
-        assert!((told(0.0) - 0.9733).abs() < 1e-3, "{}", told(0.0));
-        let mean = |strays: f64| {
+        assert!((relative_information(0.0) - 0.9733).abs() < 1e-3, "{}", relative_information(0.0));
+        let mean = |outliers: f64| {
             let rng = CounterRng::new(3);
             let (mut sum, mut count) = (0.0, 0.0f64);
             for k in 0..200_000 {
                 let e = rng.normal(k);
                 if e.abs() < INLIER {
-                    sum += e * e * normal(e) / (normal(e) + strays);
+                    sum += e * e * normal(e) / (normal(e) + outliers);
                     count += 1.0;
                 }
             }
             sum / count
         };
-        for strays in [0.01, 0.1] {
-            assert!((told(strays) - mean(strays)).abs() < 0.01, "{strays}: {} {}", told(strays), mean(strays));
+        for outliers in [0.01, 0.1] {
+            assert!(
+                (relative_information(outliers) - mean(outliers)).abs() < 0.01,
+                "{outliers}: {} {}",
+                relative_information(outliers),
+                mean(outliers)
+            );
         }
     }
 
-    /// A hundred points with an odd depth stay without strays, and among as many others; ten among strays
+    /// A hundred points with an odd depth stay without outliers, and among as many others; ten among outliers
     /// that explain them do not.
     #[test]
     fn odd_depths_are_strays_where_these_are_as_many() {
@@ -219,19 +224,19 @@ mod tests {
             let odd = (500..500 + odd).map(|k| (k, 20.0, true));
             let others = (700..700 + beside).map(|k| (k, 20.0, false));
             let all = usual.chain(odd).chain(others);
-            let strays = Strays::new(
+            let outliers = OutlierPosterior::new(
                 1000,
                 beside as usize,
-                all.map(|(point, deviation, obeys)| Bin {
+                all.map(|(point, deviation, is_inlier)| Bin {
                     point,
                     deviation,
-                    obeys,
+                    is_inlier,
                     among: false,
-                    residual: if obeys { 0.5 } else { 7.0 },
+                    residual: if is_inlier { 0.5 } else { 7.0 },
                 }),
             );
-            assert!(strays.keeps(0));
-            strays.keeps(500)
+            assert!(outliers.keeps(0));
+            outliers.keeps(500)
         };
         assert!(run(100, 0) && run(100, 100) && run(1, 0));
         assert!(!run(10, 20) && !run(10, 10) && !run(1, 1));

@@ -14,7 +14,7 @@ use std::ops::Range;
 
 /// The smallest parts, as a share of the points, and the fewest points of one.
 const PART: usize = 16;
-const FEWEST: usize = 8;
+const MIN_PART: usize = 8;
 
 /// Deviations by which one of about thirty parts differs in one of a hundred pictures by chance.
 const FAR: f64 = 3.4;
@@ -29,11 +29,11 @@ const ROUNDING: f64 = 1e-6;
 /// The sums `g = sum D^t e` of a part are zero but for noise of the covariance `H_r - H_r H^-1 H_r`, with
 /// `H_r = sum D^t D` over the part and `H` over all (the score test of C. R. Rao 1948). Parts are halves of
 /// the points, halves of these, and so on.
-pub(crate) fn pulling(observations: &Observations, motion: &Motion, points: &[u32]) -> Vec<Vec<u32>> {
-    departing(observations, motion, points).unwrap_or_default()
+pub(crate) fn deviating_parts(observations: &Observations, motion: &Motion, points: &[u32]) -> Vec<Vec<u32>> {
+    tested_parts(observations, motion, points).unwrap_or_default()
 }
 
-fn departing(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
+fn tested_parts(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
     let own = observations.subset(points);
     let least = refine(&own, *motion, None, StoppingCriteria::FULL);
     let whiten = least.equations.h.cholesky()?.l();
@@ -42,7 +42,7 @@ fn departing(observations: &Observations, motion: &Motion, points: &[u32]) -> Op
     let rows = (0..own.n).map(row).collect::<Option<Vec<_>>>()?;
     let variance = seen.e[..own.n].iter().map(|e| e * e).sum::<f64>() / own.n as f64;
     let tree = Tree::new(&own.site[..own.n]);
-    let parts = tree.halves(FEWEST.max(own.n / PART));
+    let parts = tree.halves(MIN_PART.max(own.n / PART));
     let departs = |places: &Range<usize>| {
         let (mut share, mut pull) = (Matrix5::zeros(), Vector5::zeros());
         for &k in &tree.order()[places.clone()] {
@@ -50,7 +50,7 @@ fn departing(observations: &Observations, motion: &Motion, points: &[u32]) -> Op
             share += row * row.transpose();
             pull += row * seen.e[k as usize];
         }
-        departure(share, &pull, variance)
+        score_deviation(share, &pull, variance)
     };
     let far = parts.into_iter().map(|places| (departs(&places), places)).filter(|(departs, _)| *departs > FAR);
     let mut far: Vec<(f64, Range<usize>)> = far.collect();
@@ -59,7 +59,7 @@ fn departing(observations: &Observations, motion: &Motion, points: &[u32]) -> Op
 }
 
 /// How far the `pull` of a part that has the `share` of all information is from noise, in deviations.
-fn departure(share: Matrix5, pull: &Vector5, variance: f64) -> f64 {
+fn score_deviation(share: Matrix5, pull: &Vector5, variance: f64) -> f64 {
     if !share.iter().chain(pull).all(|value| value.is_finite()) {
         return 0.0;
     }
@@ -87,7 +87,7 @@ mod tests {
         let (mut chance, mut told) = (0, 0);
         for seed in 0..200 {
             let mut scene = Scene::oblique(400, 0.02, seed);
-            chance += u32::from(!pulling(&scene.observations(), &oblique(), &all).is_empty());
+            chance += u32::from(!deviating_parts(&scene.observations(), &oblique(), &all).is_empty());
             // Two deviations of a point, most of which passes for depth.
             let turned = Motion::new(oblique().translation, W.map(|w| 2.0 * w));
             for k in (0..400).filter(|&k| scene.points[k][0] > 0.3) {
@@ -95,7 +95,7 @@ mod tests {
                 let (before, after) = (oblique().plane_flow(at, nu), turned.plane_flow(at, nu));
                 scene.flow[k] = [0, 1].map(|j| scene.flow[k][j] + after[j] - before[j]);
             }
-            told += u32::from(!pulling(&scene.observations(), &oblique(), &all).is_empty());
+            told += u32::from(!deviating_parts(&scene.observations(), &oblique(), &all).is_empty());
         }
         assert!(chance <= 6 && told >= 150, "{chance} {told}");
     }
@@ -104,7 +104,7 @@ mod tests {
     fn parts_that_determine_nothing_pull_nowhere() {
         // Halves of eight points, and none.
         let few = Scene::oblique(16, 0.02, 1).observations();
-        assert!(pulling(&few, &oblique(), &(0..16).collect::<Vec<u32>>()).is_empty());
-        assert!(pulling(&few, &oblique(), &(0..5).collect::<Vec<u32>>()).is_empty());
+        assert!(deviating_parts(&few, &oblique(), &(0..16).collect::<Vec<u32>>()).is_empty());
+        assert!(deviating_parts(&few, &oblique(), &(0..5).collect::<Vec<u32>>()).is_empty());
     }
 }

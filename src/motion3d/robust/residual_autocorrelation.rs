@@ -6,15 +6,15 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::neighbours::Tree;
 
 /// Points from which on there are enough of them to tell.
-pub(crate) const ENOUGH: usize = 50;
+pub(crate) const MIN_POINTS: usize = 50;
 
 /// Neighbours whose residuals are looked at, and deviations by which they go together.
 const NEAREST: usize = 8;
 const TOGETHER: f64 = 3.0;
 
 /// Whether the residuals of neighbours among `points` have the same sign more often than noise does.
-pub(crate) fn alike(observations: &Observations, motion: &Motion, points: &[u32]) -> bool {
-    if points.len() < ENOUGH {
+pub(crate) fn is_autocorrelated(observations: &Observations, motion: &Motion, points: &[u32]) -> bool {
+    if points.len() < MIN_POINTS {
         return false;
     }
     let seen = depths(observations, motion).e;
@@ -46,10 +46,10 @@ mod tests {
         for seed in 0..100 {
             let points = Scene::oblique(400, 0.02, seed).observations();
             let all: Vec<u32> = (0..400).collect();
-            chance += u32::from(alike(&points, &oblique(), &all));
+            chance += u32::from(is_autocorrelated(&points, &oblique(), &all));
             // Off by half of the rotation, about a deviation of a point.
             let near = Motion::new(oblique().translation, W.map(|w| 1.5 * w));
-            assert!(alike(&points, &near, &all), "{seed}");
+            assert!(is_autocorrelated(&points, &near, &all), "{seed}");
         }
         assert!(chance <= 3, "{chance}");
     }

@@ -1,9 +1,9 @@
 //! Whether residuals are those of noise, and what motion it may be instead.
 
-use super::regional_score::pulling;
-use super::residual_autocorrelation::{ENOUGH, alike};
-use super::two_motion_fit::{Division, Two};
-use super::{APART, INLIER, Rival, truncated};
+use super::regional_score::deviating_parts;
+use super::residual_autocorrelation::{MIN_POINTS, is_autocorrelated};
+use super::two_motion_fit::{Division, TwoMotionFit};
+use super::{APART, CompetingMotion, INLIER, truncated};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
@@ -28,8 +28,13 @@ const EACH: f64 = 0.12;
 ///
 /// What a thing that moves by itself and the scene obey together may be more points than obey the scene's
 /// motion alone, and what every search among all of them ends at; but it leaves residuals in both.
-pub(crate) fn instead(observations: &Observations, found: &Motion, points: &[u32], rng: CounterRng) -> Option<Rival> {
-    let mut parts = otherwise(observations, found, points)?;
+pub(crate) fn competing_motion(
+    observations: &Observations,
+    found: &Motion,
+    points: &[u32],
+    rng: CounterRng,
+) -> Option<CompetingMotion> {
+    let mut parts = residual_structure(observations, found, points)?;
     let own = observations.subset(points);
     let (n, together) = (own.n as f64, refine(&own, *found, None, StoppingCriteria::FULL).equations.cost);
     let division = Division::of(own);
@@ -37,19 +42,23 @@ pub(crate) fn instead(observations: &Observations, found: &Motion, points: &[u32
         parts = division.quarters();
     }
     let divided = |part: &Vec<u32>| division.from(part, found, rng);
-    let two = parts.iter().take(PARTS).filter_map(divided).min_by(|a: &Two, b: &Two| a.cost.total_cmp(&b.cost))?;
+    let two = parts
+        .iter()
+        .take(PARTS)
+        .filter_map(divided)
+        .min_by(|a: &TwoMotionFit, b: &TwoMotionFit| a.cost.total_cmp(&b.cost))?;
     let another = |motion: &&Motion| motion.angle_to(found).to_degrees() > APART;
     let gain = together - two.cost;
     let [more, fewer] = &two.motions;
     let motion = Some(more).filter(another).or_else(|| Some(fewer).filter(another).filter(|_| gain > EACH * n))?;
     let excess = truncated(observations, motion, INLIER) - truncated(observations, found, INLIER);
-    (gain > ALL).then(|| Rival { motion: *motion, excess: excess.max(0.0), others: true })
+    (gain > ALL).then(|| CompetingMotion { motion: *motion, excess: excess.max(0.0), others: true })
 }
 
 /// Whether `points`, which obey `motion`, move otherwise all the same: residuals of neighbours have the same
 /// sign, or those of a part pull the estimate another way than those elsewhere. The parts that do.
-fn otherwise(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
-    if points.len() < ENOUGH {
+fn residual_structure(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
+    if points.len() < MIN_POINTS {
         return None;
     }
     let seen = depths(observations, motion).e;
@@ -57,8 +66,8 @@ fn otherwise(observations: &Observations, motion: &Motion, points: &[u32]) -> Op
     if squares <= LITTLE * points.len() as f64 {
         return None;
     }
-    let parts = pulling(observations, motion, points);
-    (!parts.is_empty() || alike(observations, motion, points)).then_some(parts)
+    let parts = deviating_parts(observations, motion, points);
+    (!parts.is_empty() || is_autocorrelated(observations, motion, points)).then_some(parts)
 }
 
 #[cfg(test)]
@@ -71,9 +80,9 @@ mod tests {
         let all: Vec<u32> = (0..400).collect();
         let near = Motion::new(oblique().translation, W.map(|w| 1.5 * w));
         let points = Scene::oblique(400, 0.02, 1).observations();
-        assert!(otherwise(&points, &near, &all).is_some());
-        assert!(otherwise(&points, &near, &all[..ENOUGH - 1]).is_none());
+        assert!(residual_structure(&points, &near, &all).is_some());
+        assert!(residual_structure(&points, &near, &all[..MIN_POINTS - 1]).is_none());
         let settled = Scene::oblique(400, 0.0, 1).observations();
-        assert!(otherwise(&settled, &oblique(), &all).is_none());
+        assert!(residual_structure(&settled, &oblique(), &all).is_none());
     }
 }

@@ -9,7 +9,7 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::likelihood::minima;
 
 /// The noise of all points if all obey one motion.
-pub(crate) fn sigma(observations: &Observations, rng: CounterRng) -> Option<f64> {
+pub(crate) fn noise_std(observations: &Observations, rng: CounterRng) -> Option<f64> {
     let best = minima(observations, true, rng.stream(20)).first()?.equations.cost;
     let degrees = observations.n.saturating_sub(UNKNOWNS).max(1);
     Some((best / degrees as f64).sqrt()).filter(|sigma| sigma.is_finite() && *sigma > 0.0)

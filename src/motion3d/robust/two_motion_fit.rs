@@ -1,7 +1,7 @@
 //! Points as those of two motions, where one of all leaves residuals that are no noise's.
 
-use super::graduated_weights::Narrowing;
-use super::{INLIER, LEAST, cheaper_sign};
+use super::graduated_weights::GraduatedWeights;
+use super::{INLIER, MIN_POINTS, cheaper_sign};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
@@ -12,16 +12,16 @@ use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 /// Neighbours that say with a point which motion it has: things that move by themselves are whole.
 const NEAREST: usize = 8;
 
-/// What a point counts at most: neighbours across the border of a thing do not decide.
-const MOST: f64 = INLIER * INLIER;
+/// What a point counts at most: neighbours across the border of a object do not decide.
+const MAX_SQUARE: f64 = INLIER * INLIER;
 
 /// Times that points are given to the motion that they fit, and that both are looked for anew, everywhere.
 const ROUNDS: usize = 8;
-const ANEW: usize = 3;
+const SEARCHES: usize = 3;
 
-/// Two motions, that of more points first, and what each point leaves with its own, summed.
+/// TwoMotionFit motions, that of more points first, and what each point leaves with its own, summed.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Two {
+pub(crate) struct TwoMotionFit {
     pub motions: [Motion; 2],
     pub cost: f64,
 }
@@ -50,7 +50,7 @@ impl Division {
 
     /// The division that is reached from a `part` (by index) and the rest, both of which move as `start` or
     /// nearly so; `None` where one of both loses its points.
-    pub fn from(&self, part: &[u32], start: &Motion, rng: CounterRng) -> Option<Two> {
+    pub fn from(&self, part: &[u32], start: &Motion, rng: CounterRng) -> Option<TwoMotionFit> {
         let mut second = vec![false; self.points.n];
         for &k in part {
             second[k as usize] = true;
@@ -59,23 +59,23 @@ impl Division {
         for round in 0..ROUNDS {
             for (own, motion) in motions.iter_mut().enumerate() {
                 let members = self.points.subset(&chosen(&second, own == 1));
-                if members.n <= LEAST.max(NEAREST) {
+                if members.n <= MIN_POINTS.max(NEAREST) {
                     return None;
                 }
-                *motion = if round < ANEW {
-                    Narrowing::new(&members).motions(1, rng).pop()?
+                *motion = if round < SEARCHES {
+                    GraduatedWeights::new(&members).motions(1, rng).pop()?
                 } else {
                     refine(&members, *motion, None, StoppingCriteria::ROUGH).motion
                 };
             }
             let next = self.nearer(&motions);
-            if next == second && round >= ANEW {
+            if next == second && round >= SEARCHES {
                 break;
             }
             second = next;
         }
         let members = [false, true].map(|own| self.points.subset(&chosen(&second, own)));
-        if members.iter().any(|members| members.n <= LEAST) {
+        if members.iter().any(|members| members.n <= MIN_POINTS) {
             return None;
         }
         let fitted: [_; 2] =
@@ -83,7 +83,7 @@ impl Division {
         let cost = fitted.iter().map(|minimum| minimum.equations.cost).sum();
         let signed: [Motion; 2] = std::array::from_fn(|own| cheaper_sign(&members[own], fitted[own].motion).0);
         let motions = if members[0].n < members[1].n { [signed[1], signed[0]] } else { signed };
-        Some(Two { motions, cost })
+        Some(TwoMotionFit { motions, cost })
     }
 
     /// Which points, with their neighbours, the second motion leaves less of.
@@ -92,7 +92,7 @@ impl Division {
         let order = self.tree.order();
         let gain = |place: u32| {
             let k = order[place as usize] as usize;
-            first[k].powi(2).min(MOST) - second[k].powi(2).min(MOST)
+            first[k].powi(2).min(MAX_SQUARE) - second[k].powi(2).min(MAX_SQUARE)
         };
         let mut out = vec![false; self.points.n];
         for place in 0..self.points.n as u32 {
@@ -115,10 +115,10 @@ mod tests {
 
     #[test]
     fn both_motions_are_found_from_a_part_that_is_neither() {
-        let thing = Motion::new([-0.8, 0.1, 0.3], W.map(|w| 1.5 * w));
+        let object = Motion::new([-0.8, 0.1, 0.3], W.map(|w| 1.5 * w));
         for seed in 0..5 {
             let mut scene = Scene::new(oblique(), 400, 0.6, 0.05, seed, |_, _, r| 0.5 + r);
-            let moved = Scene::new(thing, 400, 0.6, 0.05, seed, |_, _, r| 0.5 + r);
+            let moved = Scene::new(object, 400, 0.6, 0.05, seed, |_, _, r| 0.5 + r);
             for k in (0..400).filter(|&k| scene.points[k][0] > 0.2) {
                 scene.flow[k] = moved.flow[k];
             }
@@ -127,7 +127,7 @@ mod tests {
             let one = refine(&points, oblique(), None, StoppingCriteria::FULL).equations.cost;
             let division = Division::of(points);
             let two = division.from(&part, &oblique(), CounterRng::new(seed)).unwrap();
-            let off = [(0, oblique()), (1, thing)].map(|(k, truth)| two.motions[k].angle_to(&truth).to_degrees());
+            let off = [(0, oblique()), (1, object)].map(|(k, truth)| two.motions[k].angle_to(&truth).to_degrees());
             assert!(off[0] < 15.0 && off[1] < 15.0 && two.cost < 0.7 * one, "{seed}: {off:?} {} {one}", two.cost);
             assert_eq!(division.quarters().iter().filter(|part| part.len() == 200).count(), 2);
         }
