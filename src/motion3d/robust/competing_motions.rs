@@ -1,4 +1,4 @@
-//! Motions beside the one that most points obey, and which of several it is among many outliers.
+//! Motions apart from the one with the most inliers, and the choice among several with many outliers.
 
 use super::depth_consistency::DepthConsistency;
 use super::graduated_weights::{GraduatedWeights, narrow};
@@ -9,15 +9,15 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::starts::sample;
 use rayon::prelude::*;
 
-/// Points that do not obey among which a second motion is looked for.
+/// Maximum number of outliers among which a second motion is searched.
 const REJECTED: usize = 128;
 
 /// Two motions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)`
 /// are as likely.
 const UNDECIDED: f64 = 1.0;
 
-/// The motion among outliers that so many of obey that least squares follow them, from all candidates; with
-/// others that are about as likely, or that about as many points obey.
+/// Chooses the motion from all candidates if so many outliers fit by chance that least squares follow them;
+/// with others that are about as likely, or that have about as many inliers.
 pub(crate) fn among_many_outliers(
     observations: &Observations,
     on: &Observations,
@@ -32,7 +32,7 @@ pub(crate) fn among_many_outliers(
     let mut found: Vec<(Motion, f64, Vec<u32>)> = refined_by_posterior.collect();
     found.sort_by(|a, b| a.1.total_cmp(&b.1));
     let majority = MAJORITY * on.n as f64;
-    // A thing may be the likeliest for what it is alone, but it is not the scene.
+    // The motion of an object may be the likeliest, but it is not the scene's.
     let most = found.iter().map(|(_, _, inliers)| inliers.len()).max()?;
     let scene = found.iter().position(|(_, _, inliers)| inliers.len() as f64 > most as f64 - majority)?;
     let (best, cost, own) = found.remove(scene);
@@ -50,9 +50,9 @@ pub(crate) fn among_many_outliers(
     Some((best, competing))
 }
 
-/// What most points obey that do not obey `best`, refined on all, where they are so many that they may be the
-/// scene: the search among all may see one thing's motion only, from five sides, which part of the other's
-/// points obey by chance.
+/// Searches the motion with the most inliers among the outliers of `best` and refines it on all points, if
+/// they are so many that they may be the scene. All starts of the first search may end at the motion of one
+/// object.
 pub(crate) fn second(observations: &Observations, best: Motion, rng: CounterRng) -> Option<(Motion, f64)> {
     let inliers = inliers_of(observations, &best);
     let rejected: Vec<u32> = (0..observations.n as u32).filter(|k| inliers.binary_search(k).is_err()).collect();
@@ -67,8 +67,8 @@ pub(crate) fn second(observations: &Observations, best: Motion, rng: CounterRng)
     Some(cheaper_sign(observations, narrow(observations, found, INLIER)))
 }
 
-/// Of the candidates, cheapest first, those that cost about as much as the first, or that fewer points obey
-/// only because others do.
+/// Of the candidates, cheapest first, those that cost about as much as the first, or that have fewer
+/// inliers only because other points fit them.
 pub(crate) fn competing_motions(observations: &Observations, candidates: &[(Motion, f64)]) -> Vec<CompetingMotion> {
     let (n, best) = (observations.n as f64, candidates[0]);
     let inliers_of_best = inliers_of(observations, &best.0);

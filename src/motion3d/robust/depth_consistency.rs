@@ -1,10 +1,9 @@
-//! Outliers along their epipolar line obey any motion, but not with the depth of their neighbours.
+//! Outliers along their epipolar line fit any motion, but not with the depth of their neighbours.
 //!
-//! A depth that differs from its neighbours' is no proof: few near things before a far background are as
-//! rare, and carry all of the translation. What tells outliers is how many there are: spread evenly, as many
-//! obey a motion with such a depth as miss its epipolar line by a little more and have the same depth. Points
-//! whose depths are as odd are outliers as far as that many explain them (the local false discovery rate; B.
-//! Efron 2001).
+//! A depth that differs from its neighbours' is no proof: few near objects before a far background are as
+//! rare, and carry all of the translation. Their number decides: of outliers spread evenly, as many fit a
+//! motion with such a depth as miss its epipolar line by a little more and have the same depth. Points with
+//! such depths are outliers if that many explain them (the local false discovery rate; B. Efron 2001).
 
 use super::moving_objects::more_than_usual;
 use super::outlier_posterior::{BAND, Bin, DOUBLING, OutlierPosterior};
@@ -32,17 +31,17 @@ const TOGETHER: usize = 64;
 const SHARE: f64 = 0.85;
 const SHARE_DEVIATION: f64 = 1.44;
 
-/// What is told of points at a motion.
+/// Properties of points at a motion.
 pub(crate) struct Judged {
     pub outliers: OutlierPosterior,
-    /// Depths drawn to the median of the neighbours', as far as that can be trusted; 0 of points far from
-    /// their lines.
+    /// Depths drawn to the median of the neighbours', weighted by its precision; 0 of points far from their
+    /// lines.
     pub smooth: Vec<f64>,
     /// Minus twice by how much, in nats, residuals and depths are likelier than those of outliers alone.
     pub cost: f64,
 }
 
-/// Tells depths that do not fit among their neighbours'.
+/// Rejects depths that disagree with their neighbours'.
 pub(crate) struct DepthConsistency<'a> {
     observations: &'a Observations,
     /// All points by cells, where there are many.
@@ -70,7 +69,7 @@ impl<'a> DepthConsistency<'a> {
         (kept, Some(outliers))
     }
 
-    /// Who of those that obey a motion may be outliers; `None` where these are too few to have neighbours.
+    /// Finds which inliers of a motion may be outliers; `None` where these are too few to have neighbours.
     pub fn judged(&self, motion: &Motion, inliers: &[u32]) -> Option<Judged> {
         if inliers.len() <= NEAREST {
             return None;

@@ -1,4 +1,4 @@
-//! From directions that are searched to motions that points obey, by weights that narrow.
+//! From the directions of the search to motions of many inliers, by graduated weights.
 
 use super::{APART, INLIER, search};
 use crate::math::random::CounterRng;

@@ -1,5 +1,4 @@
-//! Whether a motion hangs on points that may be outliers: of few points, those that obey it by chance can be
-//! the ones that decide.
+//! Leverage check: of few points, outliers that fit by chance can decide the motion.
 
 use super::INLIER;
 use crate::math::median;
@@ -14,15 +13,15 @@ use nalgebra::{Matrix2x3, Vector3};
 /// From so many inliers on no few of them decide.
 const MANY: usize = 300;
 
-/// The share of cases in which no more outliers than assumed obey by chance.
+/// The share of cases in which no more outliers than assumed fit by chance.
 const SURE: f64 = 0.95;
 
 /// By how much the deviation may grow without the points that may be outliers.
 const MAX_GROWTH: f64 = 2.0;
 
 use crate::motion3d::model::rows::Vector5;
-/// Whether the direction's deviation would more than double without the inliers that tell most of it, of as
-/// many as outliers may obey by chance.
+/// Whether the direction's deviation would more than double without the inliers of the highest leverage, as
+/// many as outliers may fit by chance.
 ///
 /// Outliers spread evenly have twice the median residual of the rejected as their range; `3 / (2 median)` of
 /// them fall within three deviations.
@@ -38,8 +37,8 @@ pub(crate) fn has_high_leverage(observations: &Observations, found: &MotionEstim
     grows(&rows, observations, suspects)
 }
 
-/// The share of outliers that obey a motion by chance, as far as their epipolar lines go: that of those
-/// evenly spread over twice the median residual of the rejected.
+/// The share of outliers that are on their epipolar lines by chance, if they are spread evenly over twice
+/// the median residual of the rejected.
 fn chance(observations: &Observations, motion: &Motion, is_inlier: impl Fn(usize) -> bool) -> f64 {
     let seen = depths(observations, motion);
     let mut sizes: Vec<f64> =
@@ -74,7 +73,7 @@ fn row(observations: &Observations, found: &MotionEstimate, k: usize) -> Option<
     Some(Vector5::new(turn.x, turn.y, spin.x, spin.y, spin.z))
 }
 
-/// Takes the row without which the deviation grows most, again and again, and tells whether that is too much.
+/// Repeatedly removes the row without which the standard deviation grows most; whether it grows too much.
 fn grows(rows: &[Vector5], observations: &Observations, suspects: usize) -> bool {
     let mut information: Matrix5 = rows.iter().map(|row| row * row.transpose()).sum();
     if let Some(known) = &observations.prior {

@@ -1,12 +1,11 @@
 //! The last steps towards the motion among points of which some are outliers.
 //!
 //! With the probability `g(e)` of each point that it is an inlier
-//! ([`outliers`](crate::motion3d::robust::outlier_posterior)), the estimating
-//! equation is `sum g(e) e D(nu~)^t = 0`. Outliers spread evenly add nothing to its mean, and nothing to its
-//! slope: when the motion moves, so does what of them obeys. So the slope is that of the inliers alone, the
-//! mean of `g e^2 D^t D` by parts, while the squares of `g e D` are those of all points: their mean is the
-//! same, as it is for every likelihood. Least squares on a fixed set of points take outliers for inliers that
-//! tell of the motion.
+//! ([`outlier_posterior`](crate::motion3d::robust::outlier_posterior)), the estimating equation is
+//! `sum g(e) e D(nu~)^t = 0`. Outliers spread evenly add nothing to its mean, and nothing to its slope: when
+//! the motion changes, so do those that fit it. So the slope is that of the inliers alone, the mean of
+//! `g e^2 D^t D` by parts, while the squares of `g e D` are those of all points: their mean is the same, as
+//! it is for every likelihood. Least squares on a fixed set of points treat outliers as inliers.
 
 use super::depth_consistency::{DepthConsistency, Judged};
 use super::outlier_posterior::{OutlierPosterior, normal};
@@ -23,14 +22,14 @@ use rayon::prelude::*;
 const STEPS: usize = 10;
 const STEP: f64 = 0.01;
 
-/// The square of all of them, in deviations, from which on they lead to something else.
+/// The square of all of them, in deviations, from which on the steps lead to another motion.
 const FARTHEST: f64 = 11.0;
 
-/// The longest step, rad: farther than that other points obey.
+/// The longest step, rad: beyond that other points are inliers.
 const LONGEST: f64 = 0.2;
 
-/// Times that points are judged anew on the way to a root, and a change of the direction, rad, that is not
-/// worth another.
+/// Times that the probabilities are updated on the way to a root, and a change of the direction, rad, that
+/// is not worth another.
 const ROUNDS: usize = 6;
 const SETTLED: f64 = 1e-3;
 
@@ -58,7 +57,7 @@ struct Sums {
 struct Among<'a> {
     all: &'a Observations,
     outliers: &'a OutlierPosterior,
-    /// Points with hardly a rejected neighbour, which alone count; `None`: all do.
+    /// Points with few rejected neighbours, which alone count; `None`: all do.
     has_inlier_neighbours: Option<&'a [bool]>,
     /// `nu~` by point, NaN where that is not known; `None`: the points' own.
     smooth: Option<Vec<f64>>,
@@ -99,7 +98,7 @@ impl Among<'_> {
         sums.information += information;
     }
 
-    /// Newton's steps to the root; `None` where they lead to something else.
+    /// Newton's steps to the root; `None` if they lead to another motion.
     fn root(
         &self,
         from: &EstimatedMotion,
@@ -176,11 +175,11 @@ pub(crate) fn weighted_by_posterior(
     Some(EstimatedMotion { covariance: scaled(&from.covariance, &before, &sums.information, &axes)?, ..at })
 }
 
-/// From a motion that was found by least squares to the root of the equation with probabilities, points
-/// judged anew on the way; with its cost. `None` where too few obey.
+/// From a motion that was found by least squares to the root of the equation with probabilities, with
+/// updated probabilities on the way; with its cost. `None` if too few are inliers.
 ///
-/// Outliers with depths of their own, which are large, weigh most in least squares; drawn to their neighbours'
-/// they weigh as inliers do.
+/// Outliers with depths of their own, which are large, weigh most in least squares; drawn to their
+/// neighbours' they weigh as inliers do.
 pub(crate) fn refined_by_posterior(
     all: &Observations,
     gate: &DepthConsistency<'_>,
@@ -230,8 +229,8 @@ fn in_axes(matrix: &Matrix5, axes: &Matrix2<f64>) -> Matrix5 {
     into * matrix * into.transpose()
 }
 
-/// The covariance after the information went from `before` to `after`, whatever else it accounts for in
-/// proportion; `axes` turn those of the direction.
+/// The covariance after the information went from `before` to `after`, with all other parts in proportion;
+/// `axes` turn those of the direction.
 fn scaled(covariance: &Matrix5, before: &Matrix5, after: &Matrix5, axes: &Matrix2<f64>) -> Option<Matrix5> {
     let (before, covariance) = (in_axes(before, axes), in_axes(covariance, axes));
     let grown = after.cholesky()?.l().transpose().try_inverse()? * before.cholesky()?.l().transpose();

@@ -1,4 +1,4 @@
-//! Points that obey one motion among points that do not.
+//! Inliers of one motion among outliers.
 
 mod competing_motions;
 mod depth_consistency;
@@ -30,8 +30,8 @@ pub(crate) use noise_scale::larger;
 use outlier_posterior::OutlierPosterior;
 pub(crate) use single_noise::one_noise;
 
-/// Residual, in units of noise, at which a point no longer obeys the motion; depths behind the camera may be
-/// as far.
+/// Residual, in units of noise, from which on a point is an outlier; depths behind the camera may be as
+/// far.
 const INLIER: f64 = 3.0;
 
 /// Starts that are refined, and the least angle between them, degrees.
@@ -44,7 +44,7 @@ const ROUNDS: usize = 10;
 /// Times that the depth gate closes.
 const GATES: usize = 2;
 
-/// The share of outliers among those that obey from which on they matter for the search.
+/// Share of outliers among the inliers from which on they matter for the search.
 const MATTER: f64 = 0.03;
 
 /// From which share on the motions of few points are not known: which of them are outliers decides between
@@ -55,7 +55,7 @@ const DOUBT: f64 = 0.1;
 const MIN_POINTS: usize = 5;
 
 /// Two motions of different points of which neither has a tenth of all points more than the other: which is
-/// the scene's cannot be told.
+/// the scene's is undecided.
 const MAJORITY: f64 = 0.1;
 
 /// What residuals that estimate noise are fewer by: the unknowns of a motion.
@@ -76,27 +76,27 @@ const LONGER: f64 = 1.0;
 /// Inliers below which a selection of them, whose noise is not known either, is not believed in.
 const FEWEST: usize = 20;
 
-/// A motion and the points that obey it.
+/// A motion and its inliers.
 #[derive(Debug, Clone)]
 pub(crate) struct Consensus {
     pub motion: Motion,
     /// Indices among the observations, ascending.
     pub inliers: Vec<u32>,
-    /// Those of them that the motion is to be estimated from: a thing that moves by itself has points that
-    /// obey by chance, and these pull the same way.
+    /// Those of them that the motion is to be estimated from: some points of a moving object fit by chance,
+    /// and these pull the same way.
     pub inner: Vec<u32>,
-    /// Other motions that about as many points obey, and how much more each costs, in squared units of noise;
+    /// Other motions with about as many inliers, and how much more each costs, in squared units of noise;
     /// the best first.
     pub competing: Vec<CompetingMotion>,
-    /// Whether the points are too few to tell outliers from large noise.
+    /// Whether the points are too few to separate outliers from large noise.
     pub doubtful: bool,
     /// Whether, of few points in unknown noise, one noise of all of them is the shorter description.
     pub single_noise: bool,
-    /// Whether so many outliers obey that least squares on all that obey would follow them.
+    /// Whether so many outliers fit by chance that least squares on all inliers would follow them.
     pub many: bool,
-    /// How likely points are outliers that obey by chance; `None` where nothing is known of that.
+    /// Probability that points are outliers that fit by chance; `None` if unknown.
     pub outliers: Option<OutlierPosterior>,
-    /// Points, obeying or not, with hardly a rejected neighbour; all of them, where that was not asked.
+    /// Points, inliers or not, with few rejected neighbours; `None`: all points.
     pub has_inlier_neighbours: Option<Vec<bool>>,
 }
 
@@ -121,13 +121,13 @@ impl Consensus {
 pub(crate) struct CompetingMotion {
     pub motion: Motion,
     pub excess: f64,
-    /// Whether points obey it that do not obey the motion that was chosen: those of another thing. Else it is
-    /// another minimum for the same points.
+    /// Whether it has inliers that are outliers of the chosen motion: those of another object. If not, it
+    /// is another minimum for the same points.
     pub others: bool,
 }
 
-/// The motion that most points obey, and others that it may be. Where the noise is not known it is estimated,
-/// and the points are measured in it afterwards.
+/// Returns the motion with the most inliers, and competing motions. Where the noise is not known it is
+/// estimated, and the points are measured in it afterwards.
 pub(crate) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let found = with_noise(scaled, rng)?;
     Some(with_doubts(&scaled.observations, found, rng))
@@ -143,7 +143,7 @@ fn with_noise(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let found = noise_scale::consensus(scaled, rng)?;
     let Some(sigma) = single_noise.map(|sigma| sigma / scaled.sigma) else { return Some(found) };
     let shorter = single_noise::shortening(&scaled.observations, &found, sigma);
-    // Whatever is the case, one noise that hardly differs from the other does no harm.
+    // If both noises are nearly equal, the choice does no harm.
     let (n, k) = (scaled.observations.n, found.inliers.len());
     let doubtful = k < n && sigma > APART_NOISE && (shorter < SURE || k < FEWEST);
     if shorter < WORTH {
@@ -207,7 +207,7 @@ fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRn
     let fewer = first_asked(observations, rng);
     let inner = fewer.is_none();
     let mut on = fewer.unwrap_or_else(|| observations.clone());
-    // Residuals that are cut off where noise told too small ends pull nowhere.
+    // Residuals that are cut off at too small a noise do not pull the estimate.
     let variance = larger(observations, &found.motion);
     on.rescale(variance.sqrt().recip());
     let shown = if inner && variance <= 1.0 { found.inner.clone() } else { inliers_of(&on, &found.motion) };
@@ -222,7 +222,7 @@ fn first_asked(observations: &Observations, rng: CounterRng) -> Option<Observati
     (observations.n > MANY).then(|| observations.subset(&sample(observations.n, FEWER, rng.stream(9))))
 }
 
-/// Motions that many points obey, with what each costs: the cheapest first.
+/// Motions with many inliers and their costs, the cheapest first.
 fn candidates(observations: &Observations, rng: CounterRng) -> Option<Vec<(Motion, f64)>> {
     let found = GraduatedWeights::new(observations).motions(STARTS, rng);
     let mut all: Vec<(Motion, f64)> = found.into_iter().map(|motion| cheaper_sign(observations, motion)).collect();
@@ -248,7 +248,7 @@ fn inliers_of(observations: &Observations, motion: &Motion) -> Vec<u32> {
     (0..observations.n as u32).filter(is_inlier).collect()
 }
 
-/// Maximum likelihood on the points that obey, until these stay the same.
+/// Maximum likelihood on the inliers, until these stay the same.
 fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
     let mut motion = start;
     let mut inliers = inliers_of(observations, &motion);

@@ -1,5 +1,5 @@
-//! Things that move by themselves are whole: points among them that obey the scene's motion by chance pull it
-//! towards theirs.
+//! Rejection of moving objects, which are connected: their points that fit the scene's motion by chance
+//! pull it towards theirs.
 
 use super::{CompetingMotion, Consensus, MANY, MIN_POINTS, inliers_of};
 use crate::math::median;
@@ -22,8 +22,8 @@ const MORE: f64 = 3.0;
 /// Times that points are left out and the rest is looked at again.
 const ROUNDS: usize = 5;
 
-/// The 0.999 quantile of chi-squared with two degrees of freedom, and what the variance of a direction counts
-/// besides what leaving points out adds to it.
+/// The 0.999 quantile of chi-squared with two degrees of freedom, and the share of the variance of a
+/// direction that is added to the difference of both variances.
 const RARE: f64 = 13.8;
 const BESIDES: f64 = 0.1;
 
@@ -48,7 +48,7 @@ impl Around {
         Self::Nearest(tree, lists)
     }
 
-    /// The share of each point's neighbours that do not obey.
+    /// The share of outliers among each point's neighbours.
     fn rejected(&self, is_inlier: &[bool]) -> Vec<f64> {
         let mut shares = vec![0.0; is_inlier.len()];
         match self {
@@ -73,14 +73,14 @@ impl Around {
     }
 }
 
-/// The inliers among which hardly a point is of a object that moves by itself.
+/// The inliers of which few belong to a moving object.
 pub(crate) struct Inner {
-    /// Those with hardly a rejected neighbour; all of them, where few would be left.
+    /// Those with few rejected neighbours; all of them, if few would be left.
     pub inliers: Vec<u32>,
     /// The motion of all inliers (where few would be left: of those few), if it is another one: then points
-    /// on the border of a thing belong to that.
+    /// on the border of an object belong to that.
     pub competitor: Option<CompetingMotion>,
-    /// Points with hardly a rejected neighbour; `None` where few would be left.
+    /// Points with few rejected neighbours; `None` if few would be left.
     pub has_inlier_neighbours: Option<Vec<bool>>,
 }
 

@@ -1,8 +1,8 @@
-//! The noise that the inliers leave, where it is not told.
+//! Estimates unknown noise from the residuals of the inliers.
 //!
-//! It is a fixed point of its own estimate, and there may be several: with a thing that moves by itself, one
-//! at the noise and one at which both motions pass for one in larger noise. Residuals of a thing have the
-//! same sign as their neighbours', which those of noise do not.
+//! The noise is a fixed point of its own estimate, and there may be several: with a moving object, one at
+//! the noise and one at which both motions pass for one in larger noise. Residuals of an object have the
+//! same sign as their neighbours', those of noise do not.
 
 use super::residual_autocorrelation::is_autocorrelated;
 use super::{Consensus, UNKNOWNS, in_known_noise};
@@ -29,7 +29,8 @@ const STEPS: usize = 50;
 /// The share of the inliers in larger noise that those in smaller noise must be.
 const MIN_INLIER_SHARE: f64 = 0.5;
 
-/// The motion that most points obey in the noise that they leave; points are measured in that afterwards.
+/// Returns the motion with the most inliers in the noise of these inliers, which becomes the unit of the
+/// points.
 pub(crate) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let flow = scaled.observations.median_flow() * scaled.sigma;
     let mut larger: Option<(Consensus, f64)> = None;
@@ -46,7 +47,7 @@ pub(crate) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
             larger = Some((found, scaled.sigma));
         }
     }
-    // Nothing tells a thing from errors of flow that go together.
+    // A moving object looks the same as correlated errors of the flow.
     let (found, sigma) = larger?;
     scaled.take(sigma / scaled.sigma);
     Some(found)
@@ -66,11 +67,11 @@ fn fixed_point(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     Some(found)
 }
 
-/// By how many deviations the noise of points that obey must be larger than it is told.
+/// Standard deviations by which the noise of the inliers must exceed the given one.
 const LARGER: f64 = 4.0;
 
-/// What the noise of the points that obey is larger by, in variance, than is told, where chance does not
-/// explain it; 1 where errors are not independent.
+/// Variance of the noise of the inliers relative to the given one, if chance does not explain the
+/// difference; 1 if errors are not independent.
 pub(crate) fn larger(observations: &Observations, motion: &Motion) -> f64 {
     if !observations.independent {
         return 1.0;

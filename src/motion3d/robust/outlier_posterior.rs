@@ -1,14 +1,15 @@
-//! How likely a point that obeys is a outlier that does so by chance, by how odd its depth is.
+//! Probability that an inlier is an outlier that fits by chance, by how far its depth is from its
+//! neighbours'.
 //!
-//! Of points whose depths deviate alike, `h` inliers have residuals with the density `h phi(e)`, and outliers,
-//! which know nothing of the motion, `b` in every unit of residual. Those a little farther from their
-//! epipolar lines than inliers are tell `b`; what is left of those that obey tells `h`. A point is an inlier
-//! with the probability `h phi(e) / (h phi(e) + b)`.
+//! Of points whose depths deviate alike, `h` inliers have residuals with the density `h phi(e)`, and
+//! outliers, which do not depend on the motion, `b` in every unit of residual. Points a little farther from
+//! their epipolar lines than inliers determine `b`; the remaining inliers determine `h`. A point is an
+//! inlier with the probability `h phi(e) / (h phi(e) + b)`.
 
 use super::INLIER;
 use std::ops::Range;
 
-/// Residuals, in units of noise, from which outliers are counted: hardly an inlier has so large a one.
+/// Residuals, in units of noise, from which outliers are counted: almost no inlier has so large a residual.
 pub(crate) const BAND: Range<f64> = 4.0..10.0;
 
 /// The share of inliers that have residuals beyond that, and a margin.
@@ -41,7 +42,7 @@ pub(crate) struct Bin {
     /// Of its depth, in units of what is usual.
     pub deviation: f64,
     pub is_inlier: bool,
-    /// Whether it lies among points that do not obey.
+    /// Whether more of its neighbours are outliers than is usual.
     pub among: bool,
     /// Across the epipolar line, in units of noise.
     pub residual: f64,
@@ -53,7 +54,7 @@ pub(crate) struct Odds {
     /// `b / h`: outliers in a unit of residual for every inlier; infinite where outliers explain all of the
     /// points.
     pub outliers: f64,
-    /// The information of an inlier's residual relative to that without outliers, for each that obeys.
+    /// The information of an inlier's residual relative to that without outliers.
     pub information: f64,
 }
 
@@ -63,7 +64,7 @@ pub(crate) struct OutlierPosterior {
     bins: Vec<u8>,
     odds: [Odds; BINS],
     dropped: [bool; BINS],
-    /// The share of outliers among all that obey and are not left out.
+    /// The share of outliers among all inliers that are kept.
     pub share: f64,
 }
 
@@ -75,8 +76,8 @@ pub(crate) fn normal(e: f64) -> f64 {
 /// The share of a normal distribution within the limit of inliers.
 const WITHIN: f64 = 0.997_300_2;
 
-/// `int phi^2 e^2 / (phi + outliers) de` over what obeys: the mean of `g e^2` of inliers, which by parts is the
-/// mean slope of `g e`, jumps at the limit included, too.
+/// `int phi^2 e^2 / (phi + outliers) de` over the inliers: the mean of `g e^2` of inliers, which by parts
+/// is the mean slope of `g e`, jumps at the limit included, too.
 fn relative_information(outliers: f64) -> f64 {
     const STEPS: i32 = 60;
     let step = 2.0 * INLIER / f64::from(STEPS);
@@ -89,8 +90,8 @@ fn relative_information(outliers: f64) -> f64 {
     (0..=STEPS).map(value).sum::<f64>() * step / WITHIN
 }
 
-/// How often, of outliers alone, at least `obeying` obey where `beside` and one that is yet unseen do not: each
-/// obeys with the share that the strip of inliers has, `wider` times that of the band.
+/// Probability that at least `fitted` outliers fit by chance if `beside` and one unseen outlier do not:
+/// each fits with the share of the strip of inliers, `wider` times that of the band.
 fn by_chance(fitted: usize, beside: usize, wider: f64) -> f64 {
     let (n, p) = (fitted + beside + 1, wider / (1.0 + wider));
     // Terms of the binomial distribution, from all of them down to none of the others.
@@ -122,7 +123,7 @@ impl OutlierPosterior {
         let (mut fitted, mut beside) = ([0usize; BINS], [0usize; BINS]);
         for point in points {
             let place = bin(point.deviation);
-            // Those of a thing that moves by itself, which is whole, and not of a near one.
+            // Points of a moving object, which is connected, and not of a near one.
             if point.among && place % SIZES >= FIRST.len() {
                 continue;
             }
@@ -188,10 +189,10 @@ mod tests {
         assert_eq!(bin(-2.5), SIZES + 4);
     }
 
-    /// A quarter of the variance is not told where outliers are a third of what obeys; without outliers only what
-    /// lies beyond the limit is missing.
+    /// A quarter of the information is lost where outliers are a third of the inliers; without outliers
+    /// only what lies beyond the limit is missing.
     #[test]
-    fn strays_take_information_away() {
+    fn outliers_take_information_away() {
         assert!((relative_information(0.0) - 0.9733).abs() < 1e-3, "{}", relative_information(0.0));
         let mean = |outliers: f64| {
             let rng = CounterRng::new(3);
@@ -218,7 +219,7 @@ mod tests {
     /// A hundred points with an odd depth stay without outliers, and among as many others; ten among outliers
     /// that explain them do not.
     #[test]
-    fn odd_depths_are_strays_where_these_are_as_many() {
+    fn odd_depths_are_outliers_where_these_are_as_many() {
         let run = |odd: u32, beside: u32| {
             let usual = (0..500).map(|k| (k, 0.1, true));
             let odd = (500..500 + odd).map(|k| (k, 20.0, true));

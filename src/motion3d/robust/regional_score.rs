@@ -1,6 +1,6 @@
-//! Whether one part of the picture asks for another motion than the rest: where a thing that moves by itself
-//! and the scene obey a third motion together, their residuals are as small as noise, but those of each pull
-//! another way.
+//! Score test for parts of the picture that have another motion than the rest. A moving object and the
+//! scene may fit a third motion together with residuals as small as noise, but those of each pull the
+//! estimate another way.
 
 use crate::motion3d::kernels::{depths, slopes};
 use crate::motion3d::model::motion::Motion;

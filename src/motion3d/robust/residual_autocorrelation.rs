@@ -1,11 +1,11 @@
-//! Whether residuals go together: where points move otherwise, they have the same sign as their neighbours'.
+//! Residual autocorrelation: points of another motion have residuals of the same sign as their neighbours'.
 
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::neighbours::Tree;
 
-/// Points from which on there are enough of them to tell.
+/// Minimum number of points for the test.
 pub(crate) const MIN_POINTS: usize = 50;
 
 /// Neighbours whose residuals are looked at, and deviations by which they go together.

@@ -22,12 +22,13 @@ const PARTS: usize = 4;
 const ALL: f64 = 20.0;
 const EACH: f64 = 0.12;
 
-/// What may be the scene's motion instead of `found`, if the `points` that obey that move otherwise all the
-/// same: where two motions explain them better, that of more points, or else of fewer, if it is another.
-/// `None` where that is not worth another motion, as where errors of flow go together and that is not told.
+/// Returns what may be the scene's motion instead of `found` if its inliers `points` have structured
+/// residuals: if two motions explain them better, that of more points, or of fewer, if it is another one.
+/// `None` if the gain is too small for another motion, as with correlated errors that are given as
+/// independent.
 ///
-/// What a thing that moves by itself and the scene obey together may be more points than obey the scene's
-/// motion alone, and what every search among all of them ends at; but it leaves residuals in both.
+/// A third motion between those of an object and the scene may have more inliers than the scene's motion
+/// alone, and every search may end there; but it leaves residuals in both.
 pub(crate) fn competing_motion(
     observations: &Observations,
     found: &Motion,
@@ -55,8 +56,8 @@ pub(crate) fn competing_motion(
     (gain > ALL).then(|| CompetingMotion { motion: *motion, excess: excess.max(0.0), others: true })
 }
 
-/// Whether `points`, which obey `motion`, move otherwise all the same: residuals of neighbours have the same
-/// sign, or those of a part pull the estimate another way than those elsewhere. The parts that do.
+/// Residual structure test of the inliers `points` of `motion`: residuals of neighbours have the same sign,
+/// or those of a part pull the estimate another way than those elsewhere. Returns these parts.
 fn residual_structure(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
     if points.len() < MIN_POINTS {
         return None;

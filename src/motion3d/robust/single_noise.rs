@@ -8,7 +8,7 @@ use crate::motion3d::kernels::depths;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::likelihood::minima;
 
-/// The noise of all points if all obey one motion.
+/// Estimates the noise of all points if all are inliers of one motion.
 pub(crate) fn noise_std(observations: &Observations, rng: CounterRng) -> Option<f64> {
     let best = minima(observations, true, rng.stream(20)).first()?.equations.cost;
     let degrees = observations.n.saturating_sub(UNKNOWNS).max(1);

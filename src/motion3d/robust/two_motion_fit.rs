@@ -9,13 +9,14 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::neighbours::{Neighbours, Tree};
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 
-/// Neighbours that say with a point which motion it has: things that move by themselves are whole.
+/// Neighbours that decide with a point which motion it has: moving objects are connected.
 const NEAREST: usize = 8;
 
 /// What a point counts at most: neighbours across the border of a object do not decide.
 const MAX_SQUARE: f64 = INLIER * INLIER;
 
-/// Times that points are given to the motion that they fit, and that both are looked for anew, everywhere.
+/// Times that points are given to the motion that they fit, and that both are searched again from all
+/// directions.
 const ROUNDS: usize = 8;
 const SEARCHES: usize = 3;
 

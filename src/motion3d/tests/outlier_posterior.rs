@@ -28,7 +28,7 @@ fn among_outliers(outliers: f64, noise: f64, seed: u64) -> Scene {
 
 /// Outliers that fit by chance carry no information, however large their apparent depths.
 #[test]
-fn strays_that_obey_are_in_the_covariance() {
+fn outliers_that_fit_by_chance_are_in_the_covariance() {
     let options = MotionOptions { placement: Placement::Start, robust: true, ..MotionOptions::default() };
     for (outliers, noise) in [(0.4, 0.2), (0.6, 0.1), (0.6, 0.2)] {
         let (mut sure, mut inside) = (0, 0);
