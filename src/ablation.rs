@@ -51,6 +51,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("particle.contrast", "colours of the surroundings count less"),
     ("particle.values", "pixels without hue have bins of value"),
     ("particle.aspect", "width and height change together"),
+    ("particle.quick_start", "half of the first particles take the motion of tracks"),
     ("particle.recovery", "a hidden target takes over a group of tracks"),
     ("particle.velocity_factor", "particles near the constant-velocity prediction weigh more"),
     ("particle.near_particles", "more particles while another target is near"),

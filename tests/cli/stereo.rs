@@ -173,7 +173,7 @@ fn rows_are_found_whatever_a_film_begins_with() {
     }
     let place = recorded_as(1, |_| [vec![16; WIDTH * HEIGHT], vec![16; WIDTH * HEIGHT]]);
     let ended = place.good("stereo left right -o o");
-    assert!(ended.err.contains("no pair shows enough to tell the row offset"), "{}", ended.err);
+    assert!(ended.err.contains("no pair shows enough to estimate the row offset"), "{}", ended.err);
 }
 
 /// The right view ten rows lower, which is farther than is searched.

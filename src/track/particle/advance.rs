@@ -3,17 +3,21 @@
 use super::appearance::CentredBox;
 use super::cloud::{Cloud, Purpose, Start, stream};
 use super::colour_table::ColourTable;
+use super::corners::Track;
 use super::evidence::{Evidence, track_evidence};
-use super::geometry::distance;
+use super::geometry::{distance, holds};
 use super::likelihood::{DistanceFactor, Factors, TrackFactor, VelocityFactor};
 use super::noise::{Noise, colour_gain};
 use super::prediction::FrameContext;
 use super::recovery::{Recovery, recover};
 use super::target::Target;
 use crate::math::quantile;
+use crate::math::random::CounterRng;
 
 /// Quantile of the similarity over the particles that stands for the target.
 const SIMILARITY_QUANTILE: f64 = 0.9;
+/// Tracks that a quick start needs, and the probability of not being background above which they count.
+const QUICK_START: (usize, f64) = (3, 0.5);
 
 impl Target {
     /// Selection, prediction, weights and estimate of one frame. `own`: index of the target in the context.
@@ -28,6 +32,9 @@ impl Target {
             context.options.n_near
         };
         self.cloud.select(context.options.resampling, context.options.ess_threshold, count, selection);
+        if self.is_new && context.factors.tracks && context.options.uses("particle.quick_start") {
+            self.quick_start(context.tracks, rng(Purpose::QuickStart));
+        }
         let noise = Noise::of_options(context.options, context.scale).times(self.presence.noise());
         self.cloud.predict(&context.camera, &noise, self.first_size, transition);
         let mut place = prediction.place;
@@ -49,7 +56,30 @@ impl Target {
         self.degenerate = !self.cloud.weigh(&logs);
         self.effective_sample_size = self.cloud.effective_sample_size();
         self.estimate = self.cloud.mean();
+        self.is_new = false;
         self.similarity = quantile(&mut similarities, SIMILARITY_QUANTILE).unwrap_or(self.similarity);
+    }
+
+    /// Half of the particles take the motion of a track in the box, drawn by the probability of foreground: a
+    /// target that moves more than its particles spread is otherwise lost in its first frames.
+    fn quick_start(&mut self, tracks: &[Track], rng: CounterRng) {
+        let bounds = self.bounds();
+        let inside = |track: &&Track| track.foreground > QUICK_START.1 && holds(bounds, track.previous(), 1.0, 0.0);
+        let candidates: Vec<(f64, [f64; 2])> =
+            tracks.iter().filter(inside).filter_map(|track| Some((track.foreground, track.residual?))).collect();
+        if candidates.len() < QUICK_START.0 {
+            return;
+        }
+        let total: f64 = candidates.iter().map(|(p, _)| p).sum();
+        for (i, particle) in self.cloud.particles.iter_mut().enumerate().step_by(2) {
+            let mut left = rng.uniform(i as u64) * total;
+            let chosen = candidates.iter().find(|(p, _)| {
+                left -= p;
+                left < 0.0
+            });
+            let [u, v] = chosen.unwrap_or(&candidates[candidates.len() - 1]).1;
+            (particle[2], particle[3]) = (u, v);
+        }
     }
 
     /// Returns to where the target was last clear, moved on to this frame: estimates made while the occluder

@@ -21,6 +21,7 @@ pub(super) enum Purpose {
     Start,
     Selection,
     Transition,
+    QuickStart,
 }
 
 /// The stream of a target at a frame: the same however many targets there are.

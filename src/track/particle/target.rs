@@ -21,6 +21,8 @@ pub(super) struct Target {
     pub presence: Presence,
     /// Whether its centre, carried on by one frame, leaves the picture: it is no longer followed.
     pub is_out: bool,
+    /// Whether no frame has come since it was added.
+    pub is_new: bool,
     /// Similarity of its colours in the last frame, 0 to 1.
     pub similarity: f64,
     pub effective_sample_size: f64,
@@ -43,6 +45,7 @@ impl Target {
             estimate: start.mean,
             presence: Presence::new([x, y]),
             is_out: false,
+            is_new: true,
             similarity: 1.0,
             degenerate: false,
         }
