@@ -4,8 +4,8 @@
 //! that the states of a single-precision run (30 MB) do not fit into a cache, as those of a full frame would
 //! not.
 //!
-//! Then the parts of a particle filter's cycle, in particles; `python -m benchmarks.tables.particle_filter` times it
-//! beside NumPy and filterpy.
+//! Then the parts of a particle filter's cycle, in particles; `python -m benchmarks.tables.particle_filter`
+//! times it beside NumPy and filterpy.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use jacoflow::filter::particle::{ParticleFilter, Resampling};

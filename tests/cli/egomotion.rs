@@ -165,7 +165,8 @@ fn a_thing_ahead_has_its_own_time_to_contact() {
     let line =
         "egomotion frames --intrinsics 250,250,96,72 --method windowed --time-scheme pair --region 92,58,58,48 --quiet";
     let number = |row: &std::collections::HashMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
-    let (alone, known) = (rows(&place.good(line).out), rows(&place.good(&format!("{line} --object-rotation-std 0.0005")).out));
+    let (alone, known) =
+        (rows(&place.good(line).out), rows(&place.good(&format!("{line} --object-rotation-std 0.0005")).out));
     assert_eq!((alone.len(), known.len()), (3, 3));
     let truth = 1.0 / NEARER.ln();
     for (alone, known) in alone.iter().zip(&known) {
