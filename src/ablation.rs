@@ -97,7 +97,6 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("gradient.begun_cover", "an edge that begins to cover a large target has no vote"),
     ("gradient.beside", "behind the rim of the box the first frame is believed"),
     ("gradient.blank_frame", "a frame without the scene is passed over before anything was measured"),
-    ("gradient.comes_out", "a target that comes out of cover where expected is not searched for"),
     ("gradient.continue_template", "the template goes on outside the support"),
     ("gradient.damped", "acceleration is damped when the target becomes occluded"),
     ("gradient.detect_camera", "the scene is aligned while nothing has moved yet"),

@@ -63,16 +63,7 @@ pub(super) fn locate(state: &State, frame: &Frame<f64>) -> Option<Finding> {
     if let Some(reason) = touched {
         best = locate_beside_look_alike(state, frame, levels, reason).or(best);
     }
-    // A target that comes out of cover where it is expected is seen badly at first.
-    let comes_out = |found: &Finding| {
-        crate::ablation::keeps("gradient.comes_out")
-            && state.history.reappearing > 0
-            && state.history.missed == 0
-            && found.nis < DOUBTED_INNOVATION
-    };
-    if best.is_none_or(|found| {
-        found.score.visibility < MIN_VISIBILITY_WITHOUT_SEARCH && !found.occluded && !comes_out(&found)
-    }) {
+    if best.is_none_or(|found| found.score.visibility < MIN_VISIBILITY_WITHOUT_SEARCH && !found.occluded) {
         best = search_around(state, frame).or(best);
     }
     if let Some(covered) = best.filter(|found| found.occluded) {
