@@ -31,9 +31,9 @@ pub(super) struct LaneSolution<V> {
     pub trust: V,
 }
 
-/// Smallest accepted product of two pivots over that of their columns' squared lengths, all within a pair: `1
-/// - R^2` of a column given those before it. In single precision the solution then keeps about three digits
-/// in the worst accepted pixel; in double, seven.
+/// Smallest accepted product of two pivots over that of their columns' squared lengths, within a pair of
+/// unknowns: `1 - R^2` of a column given those before it. In single precision the solution then keeps about
+/// three digits in the worst accepted pixel; in double, seven.
 pub(super) fn pivot_tolerance<T: Real>() -> f64 {
     if size_of::<T>() == 4 { 3e-4 } else { 1e-9 }
 }

@@ -32,8 +32,8 @@ pub(super) fn half_acceleration<T: SimdReal>(space: &PlanePool<T>, motion: &Plan
 
 /// Half the acceleration for flow of any speed, from that of slow flow and the `mean` of the steps.
 ///
-/// With the mean step `d` and half acceleration `c`, a particle moves from `x + c - d(x)` over `x` to `x + c
-/// + d(x)`. A particle that starts at either end follows the same path one step later or earlier, so the
+/// With the mean step `d` and half acceleration `c`, a particle goes from `x + c - d(x)` over `x` to
+/// `x + c + d(x)`. One that starts at either end follows the same path one step later or earlier, so the
 /// difference of the steps there gives `2 c(x) = d(x + c + d) - d(x + c - d) - c(x + c + d) - c(x + c - d)`.
 /// Each round removes half of this equation's error.
 pub(super) fn refine_acceleration<T: SimdReal>(
