@@ -10,15 +10,12 @@ use super::model::result::{MotionEstimate, Status};
 use super::model::whitening::Whitening;
 use super::robust;
 use super::robust::Consensus;
-use super::solver::finite_rotation::{beforehand, decides};
+use super::solver::finite_rotation::beforehand;
 use crate::error::Result;
 use crate::math::random::CounterRng;
 
 /// Least number of points for a motion.
 const MIN_POINTS: usize = 5;
-
-/// Times that a rotation is taken out of displacements and inliers are searched again.
-const TURNS: usize = 2;
 
 /// The rigid motion that explains a flow field, with covariance and depths.
 ///
@@ -81,7 +78,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         return rotation_report(flow, all, all, &rotation, scaled.sigma, options);
     }
     if options.robust {
-        let Some(kept) = exact_consensus(&whitening, &mut scaled, rng.stream(1)) else {
+        let Some(kept) = consensus(&whitening, &mut scaled, rng.stream(1)) else {
             return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
         };
         let inner = scaled.observations.subset(&kept.inner);
@@ -100,26 +97,11 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     }
 }
 
-/// The inliers of one motion, with its rotation taken out of their displacements where that makes a
-/// difference to which points are inliers.
-fn exact_consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
-    let mut kept = consensus(scaled, rng)?;
-    for _ in 0..TURNS {
-        let obeying = scaled.observations.subset(&kept.inliers);
-        if !decides(whitening, &obeying, &kept.motion) {
-            break;
-        }
-        scaled.observations = whitening.derotated(&scaled.observations, kept.motion.derotation());
-        kept = consensus(scaled, rng)?;
-    }
-    Some(kept)
-}
-
 /// The inliers of one motion, judged by their own errors.
-fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+fn consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let own = scaled.observations.own();
     scaled.observations.rescale(1.0 / own);
-    let found = robust::consensus(scaled, rng);
+    let found = robust::consensus(whitening, scaled, rng);
     scaled.observations.rescale(own);
     let mut found = found?;
     for competitor in &mut found.competing {

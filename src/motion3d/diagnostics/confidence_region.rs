@@ -7,6 +7,7 @@
 //! estimating equation, which at the true direction is zero but for the noise of its own few unknowns,
 //! however wrong its weights; and the depth map, which a wrong motion makes rough.
 
+use crate::ablation::keeps;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{Bilinear, best_rotation, depths, equations, information};
 use crate::motion3d::model::motion::Motion;
@@ -82,6 +83,9 @@ pub(crate) fn plausible_beyond(
     });
     if doubts.iter().any(|asked| asked.angle > farther.residuals && asked.cost < limit) {
         return true;
+    }
+    if !keeps("motion3d.region_by_chance") {
+        return false;
     }
     doubts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     doubts.truncate(COMPARED);

@@ -1,5 +1,6 @@
 //! Motions apart from the one with the most inliers, and the choice among several with many outliers.
 
+use super::cells::Cells;
 use super::depth_consistency::DepthConsistency;
 use super::graduated_weights::{GraduatedWeights, narrow};
 use super::{APART, CompetingMotion, FEWEST, INLIER, MAJORITY, cheaper_sign, inliers_of, mixture};
@@ -24,7 +25,8 @@ pub(crate) fn among_many_outliers(
     gate: &DepthConsistency<'_>,
     candidates: &[(Motion, f64)],
 ) -> Option<(Motion, Vec<CompetingMotion>)> {
-    let own = DepthConsistency::new(on);
+    let cells = Cells::new(on);
+    let own = DepthConsistency::new(on, &cells);
     let refined_by_posterior = candidates.par_iter().filter_map(|(motion, _)| {
         let (motion, cost) = mixture::refined_by_posterior(on, &own, *motion)?;
         Some((motion, cost, inliers_of(on, &motion)))

@@ -5,6 +5,7 @@
 //! motion with such a depth as miss its epipolar line by a little more and have the same depth. Points with
 //! such depths are outliers if that many explain them (the local false discovery rate; B. Efron 2001).
 
+use super::cells::Cells;
 use super::moving_objects::more_than_usual;
 use super::outlier_posterior::{BAND, Bin, DOUBLING, OutlierPosterior};
 use super::{Consensus, INLIER};
@@ -12,19 +13,9 @@ use crate::math::{median, quantile};
 use crate::motion3d::kernels::{Depths, depths};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::solver::neighbours::Tree;
-use crate::motion3d::solver::refine::MANY;
-use rayon::prelude::*;
-use std::ops::Range;
 
 /// Neighbours that a depth is compared with.
 const NEAREST: usize = 16;
-
-/// Most points of a cell.
-const CELL: usize = 32;
-
-/// Cells of one task.
-const TOGETHER: usize = 64;
 
 /// The share of the differences whose quantile measures them, and that quantile of a standard normal's size:
 /// high enough for two layers of depth to stay.
@@ -44,20 +35,12 @@ pub(crate) struct Judged {
 /// Rejects depths that disagree with their neighbours'.
 pub(crate) struct DepthConsistency<'a> {
     observations: &'a Observations,
-    /// All points by cells, where there are many.
-    cells: Option<(Tree, Vec<Range<usize>>)>,
+    cells: &'a Cells,
 }
 
 impl<'a> DepthConsistency<'a> {
-    /// For these points.
-    pub fn new(observations: &'a Observations) -> Self {
-        // Of many points a depth is compared with the inliers of its cell of the tree: nearly the same
-        // neighbours, found at once.
-        let cells = (observations.n > MANY).then(|| {
-            let tree = Tree::new(&observations.site);
-            let cells = tree.cells(CELL);
-            (tree, cells)
-        });
+    /// For these points, of which these are the neighbourhoods.
+    pub fn new(observations: &'a Observations, cells: &'a Cells) -> Self {
         Self { observations, cells }
     }
 
@@ -80,10 +63,7 @@ impl<'a> DepthConsistency<'a> {
         for &k in inliers {
             is_inlier[k as usize] = true;
         }
-        let around = match &self.cells {
-            Some((tree, cells)) => within_cells(tree, cells, &near, &is_inlier, &seen),
-            None => from_nearest(self.observations, &near, &is_inlier, &seen),
-        };
+        let around = within_cells(self.cells, &near, &is_inlier, &seen);
         let (differences, rejected): (Vec<f64>, Vec<f64>) = around.into_iter().unzip();
         let mut shares: Vec<f64> =
             near.iter().zip(&rejected).filter(|(k, _)| is_inlier[**k as usize]).map(|(_, share)| *share).collect();
@@ -137,55 +117,18 @@ fn deviations(near: &[u32], differences: &[f64], is_inlier: &[bool], seen: &Dept
     (near.iter().zip(differences).map(deviation).collect(), scene)
 }
 
-/// Differences of depths from the median of the inliers among their nearest points, and the share of the
-/// others there.
-fn from_nearest(observations: &Observations, near: &[u32], is_inlier: &[bool], seen: &Depths) -> Vec<(f64, f64)> {
-    let sites: Vec<[f64; 3]> = near.iter().map(|&k| observations.site[k as usize]).collect();
-    let tree = Tree::new(&sites);
-    let places: Vec<u32> = (0..near.len() as u32).collect();
-    let lists = tree.nearest(&places, NEAREST);
-    let point = |place: u32| near[tree.order()[place as usize] as usize] as usize;
-    let mut differences = vec![(0.0, 0.0); near.len()];
-    let mut around = Vec::with_capacity(NEAREST);
-    for place in 0..near.len() {
-        around.clear();
-        let inliers = lists.of(place).iter().map(|&other| point(other)).filter(|&other| is_inlier[other]);
-        around.extend(inliers.map(|other| seen.nu[other]));
-        differences[tree.order()[place] as usize] = {
-            let rejected = 1.0 - around.len() as f64 / NEAREST as f64;
-            (seen.nu[point(place as u32)] - median(&mut around).unwrap_or(0.0), rejected)
-        };
-    }
-    differences
-}
-
 /// Differences of depths from the median of the inliers in their cell, and the share of the others there.
-fn within_cells(
-    tree: &Tree,
-    cells: &[Range<usize>],
-    near: &[u32],
-    is_inlier: &[bool],
-    seen: &Depths,
-) -> Vec<(f64, f64)> {
-    let medians: Vec<Vec<(f64, f64)>> = cells
-        .par_chunks(TOGETHER)
-        .map(|cells| {
-            let mut depths = Vec::with_capacity(CELL);
-            let middle = |cell: &Range<usize>| {
-                depths.clear();
-                let members = tree.order()[cell.clone()].iter().map(|&k| k as usize);
-                depths.extend(members.filter(|&k| is_inlier[k]).map(|k| seen.nu[k]));
-                (median(&mut depths).unwrap_or(0.0), 1.0 - depths.len() as f64 / cell.len() as f64)
-            };
-            cells.iter().map(middle).collect()
-        })
-        .collect();
-    let mut middle = vec![(0.0, 0.0); is_inlier.len()];
-    for (cell, median) in cells.iter().zip(medians.into_iter().flatten()) {
-        for &k in &tree.order()[cell.clone()] {
-            middle[k as usize] = median;
+fn within_cells(cells: &Cells, near: &[u32], is_inlier: &[bool], seen: &Depths) -> Vec<(f64, f64)> {
+    let mut around = vec![(0.0, 0.0); is_inlier.len()];
+    let mut depths = Vec::new();
+    for members in cells.members() {
+        depths.clear();
+        depths.extend(members.iter().map(|&k| k as usize).filter(|&k| is_inlier[k]).map(|k| seen.nu[k]));
+        let cell = (median(&mut depths).unwrap_or(0.0), 1.0 - depths.len() as f64 / members.len() as f64);
+        for &k in members {
+            around[k as usize] = cell;
         }
     }
-    let difference = |&k: &u32| (seen.nu[k as usize] - middle[k as usize].0, middle[k as usize].1);
+    let difference = |&k: &u32| (seen.nu[k as usize] - around[k as usize].0, around[k as usize].1);
     near.iter().map(difference).collect()
 }

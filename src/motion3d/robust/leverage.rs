@@ -1,6 +1,7 @@
 //! Leverage check: of few points, outliers that fit by chance can decide the motion.
 
 use super::INLIER;
+use crate::ablation::keeps;
 use crate::math::median;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
@@ -28,7 +29,7 @@ use crate::motion3d::model::rows::Vector5;
 pub(crate) fn has_high_leverage(observations: &Observations, found: &MotionEstimate) -> bool {
     let inliers: Vec<usize> = (0..observations.n).filter(|&k| found.inliers[observations.source[k] as usize]).collect();
     let rejected = observations.n - inliers.len();
-    if rejected == 0 || inliers.len() >= MANY {
+    if !keeps("motion3d.leverage") || rejected == 0 || inliers.len() >= MANY {
         return false;
     }
     let chance = chance(observations, &found.motion, |k| found.inliers[observations.source[k] as usize]);

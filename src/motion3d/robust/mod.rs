@@ -1,8 +1,10 @@
 //! Inliers of one motion among outliers.
 
+mod cells;
 mod competing_motions;
 mod depth_consistency;
 mod graduated_weights;
+mod hidden_object;
 mod leverage;
 mod mixture;
 mod moving_objects;
@@ -15,20 +17,25 @@ mod search;
 mod single_noise;
 mod two_motion_fit;
 
+use crate::ablation::keeps;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{consensus as truncated, depths};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Scaled};
-use crate::motion3d::solver::refine::{FEWER, MANY, StoppingCriteria, refine};
-use crate::motion3d::solver::starts::sample;
+use crate::motion3d::model::whitening::Whitening;
+use crate::motion3d::solver::finite_rotation::decides;
+use crate::motion3d::solver::refine::{MANY, StoppingCriteria, refine};
+use crate::motion3d::solver::starts::at_most;
+use cells::Cells;
 use competing_motions::{among_many_outliers, competing_motions, second};
 use depth_consistency::DepthConsistency;
-use graduated_weights::GraduatedWeights;
+use graduated_weights::{GraduatedWeights, narrow};
 pub(crate) use leverage::has_high_leverage;
 pub(crate) use mixture::{EstimatedMotion, weighted_by_posterior};
 pub(crate) use noise_scale::larger;
 use outlier_posterior::OutlierPosterior;
 pub(crate) use single_noise::one_noise;
+use std::borrow::Cow;
 
 /// Residual, in units of noise, from which on a point is an outlier; depths behind the camera may be as
 /// far.
@@ -38,8 +45,20 @@ const INLIER: f64 = 3.0;
 const STARTS: usize = 5;
 const APART: f64 = 10.0;
 
+/// Most points that a search looks at.
+const SEARCHED: usize = 1000;
+
+/// When a motion of a set of inliers that is not final is reached.
+const EFFORT: StoppingCriteria = StoppingCriteria { steps: 60, tolerance: 1e-10, deviations: 1e-2 };
+
+/// A relative change of the noise that does not change the inliers.
+const SETTLED_NOISE: f64 = 0.02;
+
 /// Rounds towards a fixed set of inliers.
 const ROUNDS: usize = 10;
+
+/// Rounds towards the noise of few points.
+const FEW_ROUNDS: usize = 4;
 
 /// Times that the depth gate closes.
 const GATES: usize = 2;
@@ -126,21 +145,25 @@ pub(crate) struct CompetingMotion {
     pub others: bool,
 }
 
+/// Candidates for the motion with the most inliers, each with its truncated cost; the cheapest first.
+type Candidates = Vec<(Motion, f64)>;
+
 /// Returns the motion with the most inliers, and competing motions. Where the noise is not known it is
-/// estimated, and the points are measured in it afterwards.
-pub(crate) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
-    let found = with_noise(scaled, rng)?;
+/// estimated, and the points are measured in it afterwards. A rotation is taken out of displacements where
+/// that changes the inliers.
+pub(crate) fn consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+    let found = with_noise(whitening, scaled, rng)?;
     Some(with_doubts(&scaled.observations, found, rng))
 }
 
-fn with_noise(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+fn with_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     if !scaled.unknown {
-        return in_known_noise(&scaled.observations, rng);
+        return in_noise(whitening, scaled, false, rng);
     }
-    let single_noise =
-        (scaled.observations.n < SELECTED).then(|| single_noise::noise_std(&scaled.observations, rng)).flatten();
+    let few = keeps("motion3d.single_noise") && scaled.observations.n < SELECTED;
+    let single_noise = few.then(|| single_noise::noise_std(&scaled.observations, rng)).flatten();
     let single_noise = single_noise.map(|sigma| sigma * scaled.sigma);
-    let found = noise_scale::consensus(scaled, rng)?;
+    let found = noise_scale::consensus(whitening, scaled, rng)?;
     let Some(sigma) = single_noise.map(|sigma| sigma / scaled.sigma) else { return Some(found) };
     let shorter = single_noise::shortening(&scaled.observations, &found, sigma);
     // If both noises are nearly equal, the choice does no harm.
@@ -148,52 +171,102 @@ fn with_noise(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let doubtful = k < n && sigma > APART_NOISE && (shorter < SURE || k < FEWEST);
     if shorter < WORTH {
         scaled.take(sigma);
-        let found = in_known_noise(&scaled.observations, rng)?;
+        let found = in_noise(whitening, scaled, false, rng)?;
         return Some(Consensus { doubtful: doubtful || found.doubtful, single_noise: shorter < -LONGER, ..found });
     }
     Some(Consensus { doubtful: doubtful || found.doubtful, ..found })
 }
 
-fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consensus> {
-    let fewer = first_asked(observations, rng);
-    let on = fewer.as_ref().unwrap_or(observations);
-    let candidates = candidates(on, rng)?;
+/// One search in the present noise, which is estimated again from the best candidate's residuals if it is
+/// `unknown`; then all other tests of that candidate run once.
+fn in_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, unknown: bool, rng: CounterRng) -> Option<Consensus> {
+    let mut candidates = searched(&first_asked(&scaled.observations, rng), rng)?;
+    let few = scaled.observations.n < SELECTED;
+    for _ in 0..if few { FEW_ROUNDS } else { ROUNDS } {
+        // A robust fit of few points follows those that agree by chance: their noise is that of all inliers.
+        let best =
+            if few { of_candidates(&scaled.observations, candidates.clone(), rng)?.motion } else { candidates[0].0 };
+        let mut changed = false;
+        if unknown {
+            let sigma = noise_scale::noise(&depths(&scaled.observations, &best).e[..scaled.observations.n]);
+            changed = (sigma - 1.0).abs() > SETTLED_NOISE;
+            scaled.take(sigma);
+        }
+        let fitted = scaled.observations.subset(&inliers_of(&scaled.observations, &best));
+        if decides(whitening, &fitted, &best) {
+            scaled.observations = whitening.derotated(&scaled.observations, best.derotation());
+            changed = true;
+        }
+        if !changed {
+            break;
+        }
+        let on = first_asked(&scaled.observations, rng);
+        if few {
+            candidates = searched(&on, rng)?;
+            continue;
+        }
+        let again = |(motion, _): &(Motion, f64)| cheaper_sign(&on, narrow(&on, *motion, INLIER));
+        candidates = candidates.iter().map(again).collect();
+        candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+    }
+    of_candidates(&scaled.observations, candidates, rng)
+}
+
+/// Finds the inliers of the best candidate, and competing motions.
+fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: CounterRng) -> Option<Consensus> {
+    let on = &*first_asked(observations, rng);
+    if keeps("motion3d.second_motion") {
+        candidates.extend(second(on, candidates.first()?.0, rng.stream(10)));
+        candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+    }
     let &(best, _) = candidates.first()?;
     let mut competing = competing_motions(on, &candidates);
     let mut found = settle(observations, best)?;
-    let gate = DepthConsistency::new(observations);
-    for _ in 0..GATES {
+    let cells = Cells::new(observations);
+    let gate = DepthConsistency::new(observations, &cells);
+    for _ in 0..if keeps("motion3d.depth_gate") { GATES } else { 0 } {
         let (kept, _) = gate.passed(&found);
-        if kept.len() < MIN_POINTS {
+        if kept.len() < MIN_POINTS || kept.len() == found.inliers.len() {
             break;
         }
-        let motion =
-            refine(&observations.subset(&kept), found.motion, None, StoppingCriteria::of(observations.n)).motion;
+        let motion = refine(&observations.subset(&kept), found.motion, None, EFFORT).motion;
         let fitted = inliers_of(observations, &motion);
         found = Consensus::new(motion, fitted);
     }
     let (mut inliers, mut outliers) = gate.passed(&found);
-    let many = outliers.as_ref().is_some_and(|outliers| outliers.share > MATTER);
+    let many = keeps("motion3d.many_outliers") && outliers.as_ref().is_some_and(|outliers| outliers.share > MATTER);
     if many && let Some((motion, others)) = among_many_outliers(observations, on, &gate, &candidates) {
         found = Consensus { many, ..Consensus::new(motion, inliers_of(observations, &motion)) };
         (inliers, outliers) = gate.passed(&found);
         competing = others;
         let share = outliers.as_ref().map_or(0.0, |outliers| outliers.share);
-        found.doubtful = share > DOUBT && observations.n < MANY;
+        found.doubtful = keeps("motion3d.doubt_few") && share > DOUBT && observations.n < MANY;
     }
     if inliers.len() >= MIN_POINTS {
         found.inliers = inliers;
-        found.outliers = outliers;
+        found.outliers = outliers.filter(|_| keeps("motion3d.outlier_mixture"));
     }
     found.competing = competing;
     if found.inliers.len() < MIN_POINTS {
         return None;
     }
     found.inner.clone_from(&found.inliers);
-    if let Some(inner) = moving_objects::inner(observations, &found) {
+    if keeps("motion3d.moving_objects")
+        && let Some(inner) = moving_objects::inner(observations, &found, &cells)
+    {
         found.inner = inner.inliers;
         found.has_inlier_neighbours = inner.has_inlier_neighbours;
         found.competing.extend(inner.competitor);
+    }
+    if keeps("motion3d.hidden_object") && observations.independent {
+        let own;
+        let cells = if on.n == observations.n {
+            &cells
+        } else {
+            own = Cells::new(on);
+            &own
+        };
+        found.competing.extend(hidden_object::hidden_object(on, cells, &found.motion, &candidates, rng.stream(11)));
     }
     Some(found)
 }
@@ -201,15 +274,16 @@ fn in_known_noise(observations: &Observations, rng: CounterRng) -> Option<Consen
 /// The same with the motion that it may be instead.
 fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRng) -> Consensus {
     // Errors that go together look like other motions everywhere.
-    if !observations.independent {
+    if !observations.independent || !keeps("motion3d.residual_structure") {
         return found;
     }
-    let fewer = first_asked(observations, rng);
-    let inner = fewer.is_none();
-    let mut on = fewer.unwrap_or_else(|| observations.clone());
+    let mut on = first_asked(observations, rng);
+    let inner = on.n == observations.n;
     // Residuals that are cut off at too small a noise do not pull the estimate.
     let variance = larger(observations, &found.motion);
-    on.rescale(variance.sqrt().recip());
+    if variance > 1.0 {
+        on.to_mut().rescale(variance.sqrt().recip());
+    }
     let shown = if inner && variance <= 1.0 { found.inner.clone() } else { inliers_of(&on, &found.motion) };
     let instead = residual_structure::competing_motion(&on, &found.motion, &shown, rng);
     let instead = instead.map(|other| CompetingMotion { excess: other.excess * variance, ..other });
@@ -217,19 +291,17 @@ fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRn
     found
 }
 
-/// The points that a search begins with; `None` where it begins with all.
-fn first_asked(observations: &Observations, rng: CounterRng) -> Option<Observations> {
-    (observations.n > MANY).then(|| observations.subset(&sample(observations.n, FEWER, rng.stream(9))))
+/// The points that a search begins with.
+fn first_asked(observations: &Observations, rng: CounterRng) -> Cow<'_, Observations> {
+    at_most(observations, SEARCHED, rng.stream(9))
 }
 
-/// Motions with many inliers and their costs, the cheapest first.
-fn candidates(observations: &Observations, rng: CounterRng) -> Option<Vec<(Motion, f64)>> {
+/// Motions with many inliers, the cheapest first.
+fn searched(observations: &Observations, rng: CounterRng) -> Option<Candidates> {
     let found = GraduatedWeights::new(observations).motions(STARTS, rng);
-    let mut all: Vec<(Motion, f64)> = found.into_iter().map(|motion| cheaper_sign(observations, motion)).collect();
+    let mut all: Candidates = found.into_iter().map(|motion| cheaper_sign(observations, motion)).collect();
     all.sort_by(|a, b| a.1.total_cmp(&b.1));
-    all.extend(second(observations, all.first()?.0, rng.stream(10)));
-    all.sort_by(|a, b| a.1.total_cmp(&b.1));
-    Some(all)
+    (!all.is_empty()).then_some(all)
 }
 
 /// The sign with the lower truncated cost, and that.
@@ -256,11 +328,11 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
         if inliers.len() < MIN_POINTS {
             return None;
         }
-        motion = refine(&observations.subset(&inliers), motion, None, StoppingCriteria::of(observations.n)).motion;
+        motion = refine(&observations.subset(&inliers), motion, None, EFFORT).motion;
         let next = inliers_of(observations, &motion);
         // Of many points a few always lie on the border.
-        let settled =
-            next == inliers || (observations.n > MANY && next.len().abs_diff(inliers.len()) * 1000 < observations.n);
+        let settled = next == inliers
+            || (observations.n > SEARCHED && next.len().abs_diff(inliers.len()) * 1000 < observations.n);
         inliers = next;
         if settled {
             break;

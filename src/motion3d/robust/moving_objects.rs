@@ -1,20 +1,21 @@
 //! Rejection of moving objects, which are connected: their points that fit the scene's motion by chance
 //! pull it towards theirs.
 
-use super::{CompetingMotion, Consensus, MANY, MIN_POINTS, inliers_of};
+use super::cells::{Cells, NEAREST, Neighbourhoods};
+use super::{CompetingMotion, Consensus, EFFORT, MIN_POINTS, inliers_of};
 use crate::math::median;
 use crate::motion3d::kernels::equations;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::tangents;
 use crate::motion3d::solver::covariance::{direction_block, inverse};
-use crate::motion3d::solver::neighbours::{Neighbours, Tree};
-use crate::motion3d::solver::refine::{StoppingCriteria, refine};
-use std::ops::Range;
+use crate::motion3d::solver::refine::refine;
 
-/// Neighbours that are looked at; points from which on there are enough of them.
-const NEAREST: usize = 16;
+/// Points from which on there are enough neighbours.
 const MIN_WITH_NEIGHBOURS: usize = 64;
+
+/// Rejected points below which no point has more of them around it than is usual.
+const MIN_REJECTED: usize = 4;
 
 /// Deviations by which rejected neighbours must be more than usual.
 const MORE: f64 = 3.0;
@@ -30,50 +31,7 @@ const BESIDES: f64 = 0.1;
 /// A difference of directions, rad, that refining leaves.
 const ROUNDING: f64 = 1e-7;
 
-/// The neighbourhoods of all points: the nearest, or the cells of the tree where there are many.
-enum Around {
-    Nearest(Tree, Neighbours),
-    Cells(Tree, Vec<Range<usize>>),
-}
-
-impl Around {
-    fn new(observations: &Observations) -> Self {
-        let tree = Tree::new(&observations.site);
-        if observations.n > MANY {
-            let cells = tree.cells(2 * NEAREST);
-            return Self::Cells(tree, cells);
-        }
-        let everyone: Vec<u32> = (0..observations.n as u32).collect();
-        let lists = tree.nearest(&everyone, NEAREST);
-        Self::Nearest(tree, lists)
-    }
-
-    /// The share of outliers among each point's neighbours.
-    fn rejected(&self, is_inlier: &[bool]) -> Vec<f64> {
-        let mut shares = vec![0.0; is_inlier.len()];
-        match self {
-            Self::Nearest(tree, lists) => {
-                for (place, &k) in tree.order().iter().enumerate() {
-                    let near = lists.of(place);
-                    let out = near.iter().filter(|&&near| !is_inlier[tree.order()[near as usize] as usize]).count();
-                    shares[k as usize] = out as f64 / near.len() as f64;
-                }
-            }
-            Self::Cells(tree, cells) => {
-                for cell in cells {
-                    let members = &tree.order()[cell.clone()];
-                    let out = members.iter().filter(|&&k| !is_inlier[k as usize]).count();
-                    for &k in members {
-                        shares[k as usize] = out as f64 / members.len() as f64;
-                    }
-                }
-            }
-        }
-        shares
-    }
-}
-
-/// The inliers of which few belong to a moving object.
+/// The inliers among which few points are of a moving object.
 pub(crate) struct Inner {
     /// Those with few rejected neighbours; all of them, if few would be left.
     pub inliers: Vec<u32>,
@@ -88,11 +46,11 @@ pub(crate) struct Inner {
 const MIN_LEFT: f64 = 0.5;
 
 /// Looks at the neighbours of the inliers; `None` where that leaves all of them.
-pub(crate) fn inner(observations: &Observations, found: &Consensus) -> Option<Inner> {
-    if observations.n < MIN_WITH_NEIGHBOURS {
+pub(crate) fn inner(observations: &Observations, found: &Consensus, cells: &Cells) -> Option<Inner> {
+    if observations.n < MIN_WITH_NEIGHBOURS || observations.n - found.inliers.len() < MIN_REJECTED {
         return None;
     }
-    let around = Around::new(observations);
+    let around = Neighbourhoods::new(cells, observations.n);
     let (motion, fewer, has_inlier_neighbours) = without(observations, found, &around);
     if fewer.len() == found.inliers.len() {
         return None;
@@ -114,7 +72,11 @@ pub(crate) fn more_than_usual(shares: &mut [f64]) -> f64 {
 
 /// The motion and the inliers without those that have a larger share of rejected neighbours than is usual,
 /// and which points have no larger one.
-fn without(observations: &Observations, found: &Consensus, around: &Around) -> (Motion, Vec<u32>, Vec<bool>) {
+fn without(
+    observations: &Observations,
+    found: &Consensus,
+    around: &Neighbourhoods<'_>,
+) -> (Motion, Vec<u32>, Vec<bool>) {
     let (mut motion, mut inliers) = (found.motion, found.inliers.clone());
     let mut has_inlier_neighbours = vec![true; observations.n];
     for _ in 0..ROUNDS {
@@ -131,7 +93,7 @@ fn without(observations: &Observations, found: &Consensus, around: &Around) -> (
         if kept == inliers || kept.len() < MIN_POINTS {
             break;
         }
-        motion = refine(&observations.subset(&kept), motion, None, StoppingCriteria::of(observations.n)).motion;
+        motion = refine(&observations.subset(&kept), motion, None, EFFORT).motion;
         inliers = kept;
         has_inlier_neighbours = rejected.iter().map(|&share| share <= limit).collect();
     }

@@ -5,11 +5,13 @@
 //! same sign as their neighbours', those of noise do not.
 
 use super::residual_autocorrelation::is_autocorrelated;
-use super::{Consensus, UNKNOWNS, in_known_noise};
+use super::{Consensus, UNKNOWNS, in_noise};
+use crate::ablation::keeps;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Scaled};
+use crate::motion3d::model::whitening::Whitening;
 
 /// First guesses, in shares of the median flow: the next one where residuals go together.
 const FIRST_SHARES: [f64; 3] = [0.05, 0.0125, 0.003];
@@ -22,8 +24,7 @@ const CUT_VARIANCE: f64 = 0.911;
 /// The share of the information about a variance that is left to them.
 const CUT_INFORMATION: f64 = 0.69;
 
-/// Most rounds, and steps of each.
-const ROUNDS: usize = 4;
+/// Most steps.
 const STEPS: usize = 50;
 
 /// The share of the inliers in larger noise that those in smaller noise must be.
@@ -31,16 +32,18 @@ const MIN_INLIER_SHARE: f64 = 0.5;
 
 /// Returns the motion with the most inliers in the noise of these inliers, which becomes the unit of the
 /// points.
-pub(crate) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
+pub(crate) fn consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let flow = scaled.observations.median_flow() * scaled.sigma;
     let mut larger: Option<(Consensus, f64)> = None;
     for share in FIRST_SHARES {
         scaled.take(share * flow / scaled.sigma);
-        let Some(found) = fixed_point(scaled, rng) else { break };
+        let Some(found) = in_noise(whitening, scaled, true, rng) else { break };
         let enough = larger
             .as_ref()
             .is_none_or(|(one, _)| found.inliers.len() as f64 > MIN_INLIER_SHARE * one.inliers.len() as f64);
-        if enough && !is_autocorrelated(&scaled.observations, &found.motion, &found.inliers) {
+        if !keeps("motion3d.noise_restarts")
+            || enough && !is_autocorrelated(&scaled.observations, &found.motion, &found.inliers)
+        {
             return Some(found);
         }
         if larger.is_none() {
@@ -53,27 +56,13 @@ pub(crate) fn consensus(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensu
     Some(found)
 }
 
-/// From the present units on, the noise that the inliers leave.
-fn fixed_point(scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
-    let mut found = in_known_noise(&scaled.observations, rng)?;
-    for _ in 0..ROUNDS {
-        let sigma = noise(&depths(&scaled.observations, &found.motion).e[..scaled.observations.n]);
-        scaled.take(sigma);
-        found = in_known_noise(&scaled.observations, rng)?;
-        if (sigma - 1.0).abs() < 0.02 {
-            break;
-        }
-    }
-    Some(found)
-}
-
 /// Standard deviations by which the noise of the inliers must exceed the given one.
 const LARGER: f64 = 4.0;
 
 /// Variance of the noise of the inliers relative to the given one, if chance does not explain the
 /// difference; 1 if errors are not independent.
 pub(crate) fn larger(observations: &Observations, motion: &Motion) -> f64 {
-    if !observations.independent {
+    if !observations.independent || !keeps("motion3d.larger_noise") {
         return 1.0;
     }
     let variance = noise(&depths(observations, motion).e[..observations.n]).powi(2);
@@ -83,7 +72,7 @@ pub(crate) fn larger(observations: &Observations, motion: &Motion) -> f64 {
 
 /// The fixed point of "the root mean square of the residuals below 2.5 sigma, divided by that of a cut normal
 /// distribution"; the five unknowns take their share away.
-fn noise(residuals: &[f64]) -> f64 {
+pub(crate) fn noise(residuals: &[f64]) -> f64 {
     let mut sigma = 1.0;
     for _ in 0..STEPS {
         let (mut sum, mut count) = (0.0, 0usize);

@@ -8,8 +8,8 @@ use crate::motion3d::solver::neighbours::Tree;
 /// Minimum number of points for the test.
 pub(crate) const MIN_POINTS: usize = 50;
 
-/// Neighbours whose residuals are looked at, and deviations by which they go together.
-const NEAREST: usize = 8;
+/// Most points of a cell whose residuals are compared, and deviations by which they go together.
+const CELL: usize = 12;
 const TOGETHER: f64 = 3.0;
 
 /// Whether the residuals of neighbours among `points` have the same sign more often than noise does.
@@ -20,19 +20,17 @@ pub(crate) fn is_autocorrelated(observations: &Observations, motion: &Motion, po
     let seen = depths(observations, motion).e;
     let sites: Vec<[f64; 3]> = points.iter().map(|&k| observations.site[k as usize]).collect();
     let tree = Tree::new(&sites);
-    let places: Vec<u32> = (0..points.len() as u32).collect();
-    let lists = tree.nearest(&places, NEAREST);
-    let residual = |place: usize| seen[points[tree.order()[place] as usize] as usize];
-    let (mut products, mut squares) = (0.0, 0.0);
-    for place in 0..points.len() {
-        let own = residual(place);
-        squares += own * own;
-        products += lists.of(place).iter().map(|&near| own * residual(near as usize)).sum::<f64>();
+    let (mut products, mut squares, mut pairs) = (0.0, 0.0, 0.0);
+    for cell in tree.cells(CELL) {
+        let count = cell.len() as f64;
+        let residuals = || tree.order()[cell.clone()].iter().map(|&k| seen[points[k as usize] as usize]);
+        let (sum, square) = (residuals().sum::<f64>(), residuals().map(|e| e * e).sum::<f64>());
+        products += sum * sum - square;
+        squares += square;
+        pairs += count * (count - 1.0);
     }
-    let variance = squares / points.len() as f64;
-    // Each of these pairs may come twice.
-    let pairs = (NEAREST * points.len()) as f64;
-    products > TOGETHER * variance * (2.0 * pairs).sqrt()
+    // Each pair comes twice.
+    products > TOGETHER * (squares / points.len() as f64) * (2.0 * pairs).sqrt()
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use super::regional_score::deviating_parts;
 use super::residual_autocorrelation::{MIN_POINTS, is_autocorrelated};
 use super::two_motion_fit::{Division, TwoMotionFit};
 use super::{APART, CompetingMotion, INLIER, truncated};
+use crate::ablation::keeps;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
@@ -67,8 +68,10 @@ fn residual_structure(observations: &Observations, motion: &Motion, points: &[u3
     if squares <= LITTLE * points.len() as f64 {
         return None;
     }
-    let parts = deviating_parts(observations, motion, points);
-    (!parts.is_empty() || is_autocorrelated(observations, motion, points)).then_some(parts)
+    let parts =
+        if keeps("motion3d.regional_score") { deviating_parts(observations, motion, points) } else { Vec::new() };
+    (!parts.is_empty() || keeps("motion3d.residual_autocorrelation") && is_autocorrelated(observations, motion, points))
+        .then_some(parts)
 }
 
 #[cfg(test)]

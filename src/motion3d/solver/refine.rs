@@ -1,5 +1,6 @@
 //! Levenberg-Marquardt on the five unknowns of a motion.
 
+use crate::ablation::keeps;
 use crate::motion3d::kernels::{Equations, equations};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
@@ -75,8 +76,9 @@ fn step(equations: &Equations, n: usize, damping: f64) -> Option<Vector5> {
         step.iter().all(|value| value.is_finite()).then_some(step)
     };
     let careful = solved(*h)?;
-    let near =
-        squared_deviations(equations, &careful, n) < NEAR * NEAR && (h - p / MAX_NOISE_SHARE).cholesky().is_some();
+    let near = keeps("motion3d.noise_free_steps")
+        && squared_deviations(equations, &careful, n) < NEAR * NEAR
+        && (h - p / MAX_NOISE_SHARE).cholesky().is_some();
     if near { solved(h - p) } else { Some(careful) }
 }
 

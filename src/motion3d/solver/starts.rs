@@ -1,6 +1,7 @@
 //! The search over directions: where on the half sphere the residuals are small.
 
 use super::refine::{StoppingCriteria, refine};
+use crate::ablation::keeps;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::best_rotation;
 use crate::motion3d::model::motion::Motion;
@@ -145,6 +146,9 @@ impl Searched {
 /// What directions all over the half sphere lead to in a few steps on few points: a minimum may be so narrow
 /// that the nearest direction looks worse than hundreds of others.
 fn basins(observations: &Observations, all: &[(Motion, f64)], rng: CounterRng) -> Vec<(Motion, f64)> {
+    if !keeps("motion3d.basins") {
+        return Vec::new();
+    }
     let few = &*at_most(observations, FEW, rng);
     let led = |&(motion, _): &(Motion, f64)| {
         let minimum = refine(few, motion, None, STEPS);
@@ -168,6 +172,9 @@ fn different(motions: impl Iterator<Item = (Motion, f64)>) -> Vec<Motion> {
 /// width, rad.
 fn within(observations: &Observations) -> (Vec<Vector3<f64>>, f64) {
     let none = (Vec::new(), 0.0);
+    if !keeps("motion3d.narrow_field_starts") {
+        return none;
+    }
     let seen = |at: &[f64; 3]| {
         let along = if observations.spherical { at[2] } else { 1.0 };
         Vector3::new(at[0], at[1], along).normalize()

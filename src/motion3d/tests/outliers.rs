@@ -36,7 +36,7 @@ fn a_handful_of_points_is_no_reason_to_stop() {
 fn few_points_do_not_choose_their_own_noise() {
     for n in [20, 30] {
         let (mut confident, mut wrong, mut small) = (0, 0, 0);
-        for seed in 0..60 {
+        for seed in 0..240 {
             let scene = Scene::oblique(n, 0.1, seed);
             let found = estimate_motion(&scene.flow(), &Noise::Unknown, &options()).unwrap();
             if found.status == Status::Ok {
@@ -45,7 +45,7 @@ fn few_points_do_not_choose_their_own_noise() {
                 small += u32::from(found.sigma < 0.05);
             }
         }
-        assert!(confident >= 15 && wrong <= 3 && small <= 1, "{n}: {wrong} and {small} of {confident}");
+        assert!(confident >= 60 && wrong <= 12 && small <= 4, "{n}: {wrong} and {small} of {confident}");
     }
     // Outliers that are far out are seen all the same.
     let mut right = 0;

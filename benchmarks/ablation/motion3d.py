@@ -1,0 +1,82 @@
+"""3-D motion: wrong estimates with status `ok`, misses of their ellipsoids, lost estimates, errors and time of
+random scenes by group, and the time of a scene without any difficulty."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.scenes import motion3d as scenes
+from benchmarks.scores.motion3d import angle, squared
+from benchmarks.tables import motion3d_coverage as coverage
+from benchmarks.tables import motion3d_honesty as honesty
+from benchmarks.tables import motion3d_layouts as layouts
+from jacoflow import motion3d
+
+Array = NDArray[np.float64]
+LARGER_IS_BETTER = ()
+FIRST = 20_000
+"""Seed of the first scene; the kept tables use smaller ones."""
+SCENES = 100
+"""Scenes of each kind."""
+FAR_OFF, DEVIATIONS, ELLIPSOID = 15.0, 4.0, 11.070
+"""Degrees and standard deviations beyond which an `ok` is wrong; 95 % of chi squared with five degrees."""
+
+
+def random_scene(seed: int, robust: bool) -> coverage.Estimated:
+    """A scene of the honesty table."""
+    make = honesty.trial(seed).scene
+    found = motion3d.estimate_motion(make.points, make.flow, sigma=make.sigma, placement="start", robust=robust)
+    return found, make.u, make.w
+
+
+def plain(seed: int, n: int) -> coverage.Estimated:
+    """Points all over 640 x 480 px, f = 500 px, inverse depths .01 to .03, unknown noise of .02 to .1 px."""
+    rng = np.random.default_rng((seed, 77))
+    u, w = scenes.motion(("oblique", "forward", "lateral", "off")[seed % 4])
+    pixels, nu = rng.uniform([0, 0], [640, 480], (n, 2)), rng.uniform(0.01, 0.03, n)
+    flow = scenes.displaced(pixels, nu, u, 0.1 * w) - pixels
+    flow += rng.uniform(0.02, 0.1) * rng.normal(size=(n, 2))
+    return motion3d.estimate_motion(pixels, flow, scenes.K, robust=True, threads=1), u, 0.1 * w
+
+
+GROUPS: dict[str, list[Callable[[int], coverage.Estimated]]] = {
+    "random": [lambda seed: random_scene(seed, False), lambda seed: random_scene(seed, True)],
+    "objects": [lambda seed, ratio=ratio: layouts.thing(seed, ratio) for ratio in (1.0, 20.0, 100.0)]
+    + [coverage.mover],
+    "outliers": [lambda seed, share=share: coverage.outliers(seed, 0.2, share) for share in (0.4, 0.6)]
+    + [coverage.few_points, lambda seed: coverage.far_background(seed, 0.2)],
+    "planes": [lambda seed, ratio=ratio: layouts.plane(seed, ratio) for ratio in (1.0, 30.0)],
+    "views": [lambda seed, depth=depth: layouts.views(seed, depth, 0.05) for depth in ("waves", "plane")],
+    "lenses": [coverage.long_lens, layouts.band],
+    "patches": [coverage.patches],
+    "plain": [lambda seed: plain(seed, 1000)],
+}  # fmt: skip
+"""Kinds of scenes by the name of their rows."""
+
+
+def rows() -> dict[str, list[float]]:
+    """One value for each scene: error as the logarithm of degrees, time of the group's estimates in ms."""
+    found: dict[str, list[float]] = {}
+    for name, kinds in GROUPS.items():
+        for figures in (judged(make, FIRST + seed) for make in kinds for seed in range(SCENES)):
+            for figure, value in figures:
+                found.setdefault(f"{name}: {figure}", []).append(value)
+    return found
+
+
+def judged(make: Callable[[int], coverage.Estimated], seed: int) -> Iterator[tuple[str, float]]:
+    """Figures of one scene."""
+    begun = time.process_time()
+    found, u, w = make(seed)
+    passed = 1e3 * (time.process_time() - begun)
+    error, is_ok = angle(found.translation, u), found.status == "ok"
+    off = np.concatenate([found.tangent @ u, w - found.rotation])
+    yield "wrong", float(is_ok and error > max(FAR_OFF, DEVIATIONS * found.direction_std))
+    yield "missed", float(is_ok and not (error < 90 and squared(off, found.covariance) < ELLIPSOID))
+    yield "not ok", float(not is_ok)
+    yield "log error", float(np.log(np.clip(np.nan_to_num(error, nan=90.0), 1e-2, 90.0)))
+    yield "ms", passed
