@@ -1,13 +1,13 @@
 """Switches each heuristic off and prints what that costs.
 
     make ablation ARGUMENTS="--only edges"
-    python -m benchmarks.ablation [--only SYSTEM or SYSTEM.RULE ...] [--keep FILE] [--data FOLDER]
+    python -m benchmarks.ablation [--only SYSTEM or SYSTEM.RULE ...] [--keep FILE] [--data FOLDER] [--jobs N]
 
 Needs jacoflow built with the feature `ablation`. Every run is a child process on one thread with the
-environment variable JACOFLOW_WITHOUT. `--keep` names a JSON file: runs that it holds are not repeated, new
-ones are added to it. The difference is "without minus with", paired by scene or seed, with its standard
-error. Verdict: a heuristic `pays` if some row is worse without it by more than two standard errors; it
-`harms` if none is worse and some row is better by as much; else it has `no effect`.
+environment variable JACOFLOW_WITHOUT; `--jobs` of them run at once. `--keep` names a JSON file: runs that it
+holds are not repeated, new ones are added to it. The difference is "without minus with", paired by scene or
+seed, with its standard error. Verdict: a heuristic `pays` if some row is worse without it by more than two
+standard errors; it `harms` if none is worse and some row is better by as much; else it has `no effect`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from benchmarks import report
@@ -45,35 +46,23 @@ def main() -> None:
     parser.add_argument(
         "--data", default=os.environ.get("JACOFLOW_DATA"), help="folder of recordings with truth"
     )
+    parser.add_argument("--jobs", type=int, default=1, help="runs at once (default 1)")
     options = parser.parse_args()
     chosen = {
         name: why for name, why in heuristics() if options.only is None or is_chosen(name, options.only)
     }
-    kept: dict[str, Values] = (
-        json.loads(options.keep.read_text()) if options.keep and options.keep.exists() else {}
-    )
-
-    def values(system: str, without: str) -> Values:
-        key = without or system
-        if key not in kept:
-            kept[key] = run(system, without, options.data)
-            if options.keep:
-                options.keep.write_text(json.dumps(kept, indent=1) + "\n")
-        return kept[key]
-
+    chosen = {name: why for name, why in chosen.items() if has_rows(system_of(name))}
+    values = all_values([*dict.fromkeys(map(system_of, chosen)), *chosen], options)
     summary: report.Rows = []
     for name, why in chosen.items():
-        system = name.split(".")[0]
-        if importlib.util.find_spec(f"benchmarks.ablation.{system}") is None:
-            continue
+        system = system_of(name)
         larger = getattr(importlib.import_module(f"benchmarks.ablation.{system}"), "LARGER_IS_BETTER", ())
-        try:
-            rows = comparison(values(system, ""), values(system, name), larger)
-        except subprocess.CalledProcessError as problem:
-            summary.append(
-                {"heuristic": name, "purpose": why, "verdict": f"failed: exit status {problem.returncode}"}
-            )
+        with_it, without = values[system], values[name]
+        if isinstance(with_it, str) or isinstance(without, str):
+            problem = with_it if isinstance(with_it, str) else without
+            summary.append({"heuristic": name, "purpose": why, "verdict": f"failed: {problem}"})
             continue
+        rows = comparison(with_it, without, larger)
         print(
             f"## {name}: {why}\n\n" + "\n".join(report.table_lines(rows)) + f"\n\n{verdict(rows)}\n",
             flush=True,
@@ -95,6 +84,40 @@ def heuristics() -> list[tuple[str, str]]:
 def is_chosen(name: str, only: Sequence[str]) -> bool:
     """Whether a heuristic or its system is listed."""
     return name in only or name.split(".")[0] in only
+
+
+def system_of(name: str) -> str:
+    """First part of a heuristic's name."""
+    return name.split(".")[0]
+
+
+def has_rows(system: str) -> bool:
+    """Whether there is a module for the system."""
+    return importlib.util.find_spec(f"benchmarks.ablation.{system}") is not None
+
+
+def all_values(keys: Sequence[str], options: argparse.Namespace) -> dict[str, Values | str]:
+    """The rows of systems (`edges`) and of systems without a heuristic (`edges.contrast`), or what went
+    wrong."""
+    keep: Path | None = options.keep
+    known: dict[str, Values] = json.loads(keep.read_text()) if keep and keep.exists() else {}
+    values: dict[str, Values | str] = {}
+
+    def find(key: str) -> Values | str:
+        if key in known:
+            return known[key]
+        try:
+            return run(system_of(key), key if "." in key else "", options.data)
+        except subprocess.CalledProcessError as problem:
+            return f"exit status {problem.returncode}"
+
+    with ThreadPoolExecutor(options.jobs) as pool:
+        for key, found in zip(keys, pool.map(find, keys), strict=True):
+            values[key] = found
+            if keep and not isinstance(found, str):
+                known[key] = found
+                keep.write_text(json.dumps(known, indent=1) + "\n")
+    return values
 
 
 def run(system: str, without: str, data: str | None) -> Values:
