@@ -46,7 +46,7 @@ fn estimates(c: &mut Criterion) {
                 ..MotionOptions::default()
             };
             group.bench_function(BenchmarkId::new(name, n), |b| {
-                b.iter(|| estimate_motion(black_box(&flow), &Noise::Sigma(SIGMA), &options));
+                b.iter(|| estimate_motion(black_box(&flow), &Noise::StandardDeviation(SIGMA), &options));
             });
         }
     }

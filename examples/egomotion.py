@@ -28,7 +28,7 @@ def design(rng: np.random.Generator) -> int:
     """Points that it takes to know the direction to half a degree."""
     for count in (50, 100, 200, 400, 800, 1600):
         points, depths = scene(count, rng)
-        bound = motion3d.motion_bound(points, TRANSLATION, ROTATION, depths, K, sigma=NOISE)
+        bound = motion3d.motion_bound(points, TRANSLATION, ROTATION, depths, K, noise_std=NOISE)
         print(f"{count:5d} points: direction to {bound.direction_std[0]:.2f} deg at best, maximum likelihood {bound.direction_std[1]:.2f}")
         if bound.direction_std[0] < 0.5:
             return count
@@ -48,14 +48,14 @@ def main() -> None:
     error = np.degrees(np.arccos(np.clip(found.camera_translation @ heading, -1, 1)))
     focus = motion3d.focus_of_expansion(found, K)
     assert focus is not None
-    print(f"status {found.status}, noise {found.sigma:.2f} px, {found.inliers.sum()} of {count} points obey ({mover.sum()} move by themselves)")
-    print(f"heading off by {error:.2f} deg, told {found.direction_std:.2f}; focus of expansion {focus[0].round(1)} px")
+    print(f"status {found.status}, noise {found.noise_std:.2f} px, {found.inliers.sum()} of {count} points are inliers ({mover.sum()} move by themselves)")
+    print(f"heading off by {error:.2f} deg, standard deviation {found.direction_std:.2f}; focus of expansion {focus[0].round(1)} px")
     print(f"rotation {found.rotation.round(5)} rad/frame, told to {found.rotation_std.round(5)}")
     contact = motion3d.time_to_contact(found)
     near = np.argmax(np.where(found.inliers, found.inv_depth_smooth, 0))
     print(f"nearest point in {contact[near]:.1f} +- {motion3d.time_to_contact_std(found)[near]:.1f} frames")
     check("heading, deg", error, 0.0, 4 * found.direction_std)
-    check("noise, px", found.sigma, NOISE, 0.05)
+    check("noise, px", found.noise_std, NOISE, 0.05)
     check("share of movers told", np.mean(~found.inliers[mover]), 1.0, 0.1)
     check("rotation, mrad/frame", 1e3 * np.linalg.norm(found.rotation - ROTATION), 0.0, 4e3 * np.linalg.norm(found.rotation_std))
 

@@ -43,7 +43,7 @@ fn two_views_in_pixels_give_motion_depths_and_focus() {
         .map(|(k, f)| [0, 1].map(|j| f[j] + 0.1 * rng.normal(2 * k as u64 + j as u64)))
         .collect();
     let flow = Flow::Plane { points: &points, flow: &noisy, camera: Some(&camera) };
-    let found = estimate_motion(&flow, &Noise::Sigma(0.1), &MotionOptions::default()).unwrap();
+    let found = estimate_motion(&flow, &Noise::StandardDeviation(0.1), &MotionOptions::default()).unwrap();
     assert_eq!((found.status, found.efficient), (Status::Ok, true));
     let error = found.motion.angle_to(&oblique()).to_degrees();
     assert!(error < 3.0 * found.direction_std && found.direction_std < 1.0, "{error} {}", found.direction_std);
@@ -64,7 +64,7 @@ fn the_predicted_deviation_is_met_where_the_design_says_so() {
     let depths: Vec<f64> = (0..500).map(|k| 0.5 + rng.stream(1).uniform(k)).collect();
     let still = vec![[0.0; 2]; 500];
     let design = Flow::Plane { points: &points, flow: &still, camera: None };
-    let bound = motion_bound(&design, &Noise::Sigma(0.05), &oblique(), &depths).unwrap();
+    let bound = motion_bound(&design, &Noise::StandardDeviation(0.05), &oblique(), &depths).unwrap();
     let mut square = 0.0;
     let trials = 200;
     for trial in 0..trials {
@@ -84,7 +84,7 @@ fn the_predicted_deviation_is_met_where_the_design_says_so() {
             ..MotionOptions::default()
         };
         let flow = Flow::Plane { points: &points, flow: &flow, camera: None };
-        let found = estimate_motion(&flow, &Noise::Sigma(0.05), &options).unwrap();
+        let found = estimate_motion(&flow, &Noise::StandardDeviation(0.05), &options).unwrap();
         square += found.motion.angle_to(&oblique()).to_degrees().powi(2);
     }
     let rms = (square / f64::from(trials as u32)).sqrt();
@@ -99,9 +99,9 @@ struct Patches {
     surfaces: Vec<[f64; 3]>,
 }
 
-fn patches(camera: &Intrinsics, truth: &Motion, n: u64, sigma: f64) -> Patches {
+fn patches(camera: &Intrinsics, truth: &Motion, n: u64, noise_std: f64) -> Patches {
     let rng = CounterRng::new(31);
-    let deviations = [sigma, sigma, sigma / 35.0, sigma / 35.0, sigma / 35.0, sigma / 35.0];
+    let deviations = [noise_std, noise_std, noise_std / 35.0, noise_std / 35.0, noise_std / 35.0, noise_std / 35.0];
     let mut out = Patches { points: vec![], motion: vec![], covariances: vec![], surfaces: vec![] };
     for k in 0..n {
         let at = [0, 1].map(|j| 0.6 * rng.uniform(2 * k + j) - 0.3);

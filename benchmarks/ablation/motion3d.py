@@ -29,7 +29,7 @@ FAR_OFF, DEVIATIONS, ELLIPSOID = 15.0, 4.0, 11.070
 def random_scene(seed: int, robust: bool) -> coverage.Estimated:
     """A scene of the honesty table."""
     make = honesty.trial(seed).scene
-    found = motion3d.estimate_motion(make.points, make.flow, sigma=make.sigma, placement="start", robust=robust)
+    found = motion3d.estimate_motion(make.points, make.flow, noise_std=make.noise_std, placement="start", robust=robust)
     return found, make.u, make.w
 
 

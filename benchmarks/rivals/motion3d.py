@@ -19,13 +19,13 @@ METHODS = {"5-point RANSAC": "RANSAC", "USAC_MAGSAC": "USAC_MAGSAC", "USAC_ACCUR
 """OpenCV's names of its robust estimators of an essential matrix."""
 
 
-def two_view(points: Array, flow: Array, camera: Array, sigma: float, method: str) -> tuple[Array, Array]:
+def two_view(points: Array, flow: Array, camera: Array, noise_std: float, method: str) -> tuple[Array, Array]:
     """(translation direction, rotation matrix) of `findEssentialMat` and `recoverPose`; threshold 2 sigma
     px. NaN where it finds none."""
     first, second = np.ascontiguousarray(points), np.ascontiguousarray(points + flow)
     cv2.setRNGSeed(0)
     essential, mask = cv2.findEssentialMat(
-        first, second, camera, method=getattr(cv2, method), prob=0.999, threshold=2 * sigma
+        first, second, camera, method=getattr(cv2, method), prob=0.999, threshold=2 * noise_std
     )
     if essential is None or essential.shape != (3, 3):
         return np.full(3, np.nan), np.full((3, 3), np.nan)

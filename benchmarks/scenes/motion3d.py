@@ -60,24 +60,24 @@ class Scene:
     depths: np.ndarray
     u: np.ndarray
     w: np.ndarray
-    sigma: float
+    noise_std: float
     K: np.ndarray | None = None
     inliers: np.ndarray | None = None
     projection: str = "plane"
 
 
-def differential(scene: str, name: str, n: int, sigma: float, seed: int, h: float = 0.6) -> Scene:
+def differential(scene: str, name: str, n: int, noise_std: float, seed: int, h: float = 0.6) -> Scene:
     """Instantaneous flow of points uniform in [-h, h]^2."""
     rng = np.random.default_rng(seed)
     u, w = motion(name)
     shape = rng.uniform(-1, 1, (n, 2))
     nu = depths(scene, shape, rng)
     g, r = rows(h * shape)
-    flow = nu[:, None] * (g @ u) + r @ w + sigma * rng.normal(size=(n, 2))
-    return Scene(h * shape, flow, nu, u, w, sigma)
+    flow = nu[:, None] * (g @ u) + r @ w + noise_std * rng.normal(size=(n, 2))
+    return Scene(h * shape, flow, nu, u, w, noise_std)
 
 
-def sphere(name: str, n: int, sigma: float, seed: int) -> Scene:
+def sphere(name: str, n: int, noise_std: float, seed: int) -> Scene:
     """Bearings all around with uniform inverse ranges."""
     rng = np.random.default_rng(seed)
     u, w = motion(name)
@@ -85,9 +85,9 @@ def sphere(name: str, n: int, sigma: float, seed: int) -> Scene:
     eta /= np.linalg.norm(eta, axis=1, keepdims=True)
     nu = rng.uniform(0.5, 1.5, n)
     flow = np.cross(eta, nu[:, None] * np.cross(u, eta) + np.cross(np.cross(w, eta), eta))
-    noise = sigma * rng.normal(size=(n, 3))
+    noise = noise_std * rng.normal(size=(n, 3))
     flow += noise - (noise * eta).sum(1, keepdims=True) * eta
-    return Scene(eta, flow, nu, u, w, sigma, projection="sphere")
+    return Scene(eta, flow, nu, u, w, noise_std, projection="sphere")
 
 
 def exponential(w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -113,7 +113,7 @@ def displaced(pixels: np.ndarray, nu: np.ndarray, u: np.ndarray, w: np.ndarray) 
 def two_views(
     scene: str,
     name: str,
-    sigma: float,
+    noise_std: float,
     median: float,
     seed: int,
     *,
@@ -122,7 +122,7 @@ def two_views(
     mover: float = 0.0,
 ) -> Scene:
     """Exact two-view motion in a 640 x 480 picture, f = 500 px; `median`: median translational flow, px;
-    `sigma` px of noise."""
+    `noise_std` px of noise."""
     rng = np.random.default_rng(seed)
     u, w = motion(name)
     w = w / 2
@@ -143,16 +143,16 @@ def two_views(
             - pixels
         )
         flow = np.where(inliers[:, None], flow, other)
-    flow = flow + sigma * rng.normal(size=(n, 2))
+    flow = flow + noise_std * rng.normal(size=(n, 2))
     if outliers:
         inliers = np.arange(n) >= round(outliers * n)
         reach = 4 * np.median(np.linalg.norm(flow, axis=1))
         flow = np.where(inliers[:, None], flow, rng.uniform(-reach, reach, (n, 2)))
-    return Scene(pixels, flow, nu, u, w, sigma, K, inliers)
+    return Scene(pixels, flow, nu, u, w, noise_std, K, inliers)
 
 
 def patches(
-    name: str, n: int, radius: float, sigma: float, seed: int, h: float, noise: int | None = None
+    name: str, n: int, radius: float, noise_std: float, seed: int, h: float, noise: int | None = None
 ) -> tuple[Scene, np.ndarray, np.ndarray]:
     """Affine flow of patches with half size `radius` px (f = 500, flow of 3 px at the mean depth): scene in
     px, Jacobians (N, 2, 2), covariances (N, 6, 6).
@@ -180,10 +180,10 @@ def patches(
         - nu[:, None] * u[2] * [0, 1]
         + np.stack([-x * w[0] - one * w[2], -2 * y * w[0] + x * w[1]], -1)
     )
-    slope = np.sqrt(3) * sigma / radius
+    slope = np.sqrt(3) * noise_std / radius
     rng = rng if noise is None else np.random.default_rng((seed, noise))
     jacobian = np.stack([along_x, along_y], -1) + slope * rng.normal(size=(n, 2, 2))
-    flow = 500 * flow + sigma * rng.normal(size=(n, 2))
-    covariance = np.broadcast_to(np.diag([sigma**2] * 2 + [slope**2] * 4), (n, 6, 6))
-    scene = Scene(500 * points + [320, 240], flow, np.column_stack([nu, slants]), u, w, sigma, K)
+    flow = 500 * flow + noise_std * rng.normal(size=(n, 2))
+    covariance = np.broadcast_to(np.diag([noise_std**2] * 2 + [slope**2] * 4), (n, 6, 6))
+    scene = Scene(500 * points + [320, 240], flow, np.column_stack([nu, slants]), u, w, noise_std, K)
     return scene, jacobian, covariance

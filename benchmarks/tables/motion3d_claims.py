@@ -136,7 +136,7 @@ def minima(make: scenes.Scene, most: int = 5) -> list[motion3d.MotionEstimate]:
             chosen.append(int(start))
     return [
         motion3d.estimate_motion(
-            make.points, make.flow, scenes.K, sigma=make.sigma, method="ml", initial=(directions[d], w[d])
+            make.points, make.flow, scenes.K, noise_std=make.noise_std, method="ml", initial=(directions[d], w[d])
         )
         for d in chosen
     ]
@@ -178,7 +178,7 @@ def between_minima(trials: int) -> Iterator[Row]:
         for seed in range(trials):
             make = scenes.two_views("smooth", name, 0.5, median, seed, n=600)
             run = lambda make=make, **options: motion3d.estimate_motion(
-                make.points, make.flow, scenes.K, sigma=0.5, **options
+                make.points, make.flow, scenes.K, noise_std=0.5, **options
             )
             plain, found, nearest = minima(make), run(), run(method="ml", initial=(make.u, make.w))
             chosen = (
@@ -205,7 +205,7 @@ def unknown_noise(trials: int) -> Iterator[Row]:
         for seed in range(trials):
             make = scenes.two_views("uniform", "oblique", 0.3, 4, seed, outliers=share)
             sigmas.append(
-                motion3d.estimate_motion(make.points, make.flow, scenes.K, robust=True, method="ml").sigma
+                motion3d.estimate_motion(make.points, make.flow, scenes.K, robust=True, method="ml").noise_std
             )
         yield {
             "what": f"noise of 0.3 px found among {share:.0%} outliers",
@@ -215,14 +215,14 @@ def unknown_noise(trials: int) -> Iterator[Row]:
         }
 
 
-def alone(flow: Array, points: Array, sigma: float) -> float:
+def alone(flow: Array, points: Array, noise_std: float) -> float:
     """Squared residuals of a rotation alone above those of pure noise, in standard deviations of the
     latter."""
     _, r = scenes.rows(points)
     design, values = r.reshape(-1, 3), flow.ravel()
     rest = values - design @ np.linalg.lstsq(design, values, rcond=None)[0]
     freedom = len(values) - 3
-    return float((rest @ rest / sigma**2 - freedom) / np.sqrt(2 * freedom))
+    return float((rest @ rest / noise_std**2 - freedom) / np.sqrt(2 * freedom))
 
 
 def rotations_alone(trials: int) -> Iterator[Row]:
@@ -240,7 +240,7 @@ def rotations_alone(trials: int) -> Iterator[Row]:
             values = moved + r @ make.w + 0.01 * rng.normal(size=(300, 2))
             deviations.append(alone(values, make.points, 0.01))
             told.append(
-                motion3d.estimate_motion(make.points, values, sigma=0.01, placement="start").status
+                motion3d.estimate_motion(make.points, values, noise_std=0.01, placement="start").status
                 == "rotation_only"
             )
         yield {
@@ -263,7 +263,7 @@ def exact_points(trials: int) -> Iterator[Row]:
         right = 0
         for seed in range(trials):
             make = scenes.differential("uniform", "oblique", n, 0.0, seed)
-            found = motion3d.estimate_motion(make.points, make.flow, sigma=1e-6, placement="start")
+            found = motion3d.estimate_motion(make.points, make.flow, noise_std=1e-6, placement="start")
             right += angle(found.translation, make.u) < 0.1
         yield {
             "what": f"{n} exact points: the true motion picked",
@@ -279,11 +279,11 @@ def inside_the_points(trials: int) -> Iterator[Row]:
     for seed in range(trials):
         make = scenes.differential("uniform", "forward", 5000, 0.3, seed)
         found = motion3d.estimate_motion(
-            make.points, make.flow, sigma=0.3, placement="start", method="ml", initial=(make.u, make.w)
+            make.points, make.flow, noise_std=0.3, placement="start", method="ml", initial=(make.u, make.w)
         )
         errors.append(angle(found.translation, make.u))
         predicted.append(
-            motion3d.motion_bound(make.points, make.u, make.w, make.depths, sigma=0.3).direction_std[1]
+            motion3d.motion_bound(make.points, make.u, make.w, make.depths, noise_std=0.3).direction_std[1]
         )
     yield {
         "what": "uniform forward n=5000 sigma 0.3: (17), deg",
@@ -304,7 +304,7 @@ def biases(trials: int) -> Iterator[Row]:
     errors: dict[str, list[Array]] = {"ML": [], "efficient": [], "linear": [], "unbiased": []}
     for seed in range(trials):
         make = scenes.differential("smooth", "oblique", 1000, 0.1, seed)
-        found = motion3d.estimate_motion(make.points, make.flow, sigma=0.1, placement="start")
+        found = motion3d.estimate_motion(make.points, make.flow, noise_std=0.1, placement="start")
         directions = (
             found.ml.translation,
             found.translation,
@@ -338,7 +338,7 @@ def turning(trials: int) -> Iterator[Row]:
             for name in errors:
                 options = {"placement": "start"} if name == "placed half way" else {}
                 found = motion3d.estimate_motion(
-                    make.points + (0.5 * flow if options else 0), flow, scenes.K, sigma=0.2, **options
+                    make.points + (0.5 * flow if options else 0), flow, scenes.K, noise_std=0.2, **options
                 )
                 errors[name].append(angle(found.translation, make.u))
                 if found.status == "ok":

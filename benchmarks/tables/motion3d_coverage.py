@@ -48,22 +48,22 @@ def long_lens(seed: int) -> Estimated:
     (u, w), shape = _by_chance(rng), rng.uniform(-1, 1, (n, 2))
     nu = list(DEPTHS.values())[seed % len(DEPTHS)](shape, rng)
     moved = _flow(half * shape, nu, u, 0 * w)
-    sigma = float(np.exp(rng.uniform(np.log(0.01), np.log(0.1))) * np.median(np.linalg.norm(moved, axis=1)))
-    flow = _flow(half * shape, nu, u, w) + sigma * rng.normal(size=(n, 2))
-    return motion3d.estimate_motion(half * shape, flow, sigma=sigma, placement="start"), u, w
+    noise_std = float(np.exp(rng.uniform(np.log(0.01), np.log(0.1))) * np.median(np.linalg.norm(moved, axis=1)))
+    flow = _flow(half * shape, nu, u, w) + noise_std * rng.normal(size=(n, 2))
+    return motion3d.estimate_motion(half * shape, flow, noise_std=noise_std, placement="start"), u, w
 
 
 def layout(
-    seed: int, depth: str, u: tuple[float, float, float], half: float, n: int, sigma: float, turning: bool
+    seed: int, depth: str, u: tuple[float, float, float], half: float, n: int, noise_std: float, turning: bool
 ) -> Estimated:
     """Points in `[-half, half]^2` of one layout, without or with the published rotation."""
     rng = np.random.default_rng((seed, 26))
     shape = rng.uniform(-1, 1, (n, 2))
     direction, w = np.array(u) / np.linalg.norm(u), scenes.W0 * turning
-    flow = _flow(half * shape, scenes.depths(depth, shape, rng), direction, w) + sigma * rng.normal(
+    flow = _flow(half * shape, scenes.depths(depth, shape, rng), direction, w) + noise_std * rng.normal(
         size=(n, 2)
     )
-    return motion3d.estimate_motion(half * shape, flow, sigma=sigma, placement="start"), direction, w
+    return motion3d.estimate_motion(half * shape, flow, noise_std=noise_std, placement="start"), direction, w
 
 
 NARROW = (
@@ -92,12 +92,12 @@ def mover(seed: int) -> Estimated:
     median flow 6 px."""
     rng = np.random.default_rng((seed, 22))
     depth, name = ("smooth", "uniform", "layers")[seed % 3], ("oblique", "forward", "off")[seed // 3 % 3]
-    sigma = rng.uniform(0.1, 0.3)
+    noise_std = rng.uniform(0.1, 0.3)
     make = scenes.two_views(
-        depth, name, sigma, 6, 40_000 + seed, n=int(rng.uniform(300, 1200)), mover=rng.uniform(0.1, 0.33)
+        depth, name, noise_std, 6, 40_000 + seed, n=int(rng.uniform(300, 1200)), mover=rng.uniform(0.1, 0.33)
     )
     return (
-        motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=sigma, robust=True),
+        motion3d.estimate_motion(make.points, make.flow, scenes.K, noise_std=noise_std, robust=True),
         make.u,
         make.w,
     )
@@ -128,7 +128,7 @@ def outliers(seed: int, noise: float, share: float) -> Estimated:
     flow = _flow(0.6 * shape, nu, u, w) + noise * size * rng.normal(size=(1000, 2))
     flow = np.where(rng.uniform(size=(1000, 1)) < share, rng.uniform(-4 * size, 4 * size, (1000, 2)), flow)
     return (
-        motion3d.estimate_motion(0.6 * shape, flow, sigma=noise * size, placement="start", robust=True),
+        motion3d.estimate_motion(0.6 * shape, flow, noise_std=noise * size, placement="start", robust=True),
         u,
         w,
     )
@@ -155,7 +155,7 @@ def _far_background(seed: int, wrong: float) -> tuple[Array, Array, Array, Array
 def far_background(seed: int, wrong: float) -> Estimated:
     """Few near points before a far background."""
     pixels, flow, u, w = _far_background(seed, wrong)
-    return motion3d.estimate_motion(pixels, flow, scenes.K, sigma=FAR_NOISE, robust=True), u, w
+    return motion3d.estimate_motion(pixels, flow, scenes.K, noise_std=FAR_NOISE, robust=True), u, w
 
 
 def far_row(name: str, trials: int, wrong: float) -> Row:
@@ -221,22 +221,22 @@ def turns(seed: int, turn: float, robust: bool) -> Estimated:
     )
     if robust:
         flow = np.where(rng.uniform(size=(800, 1)) < 0.3, rng.uniform(-80, 80, flow.shape), flow)
-    return motion3d.estimate_motion(make.points, flow, scenes.K, sigma=0.2, robust=robust), make.u, w
+    return motion3d.estimate_motion(make.points, flow, scenes.K, noise_std=0.2, robust=robust), make.u, w
 
 
 CASES: dict[str, dict[str, Callable[[int], Estimated]]] = {
     "long": {"long lens, half width .15 to .2": long_lens},
     "narrow": {
-        f"{depth}, u {u}, half width {half:g}, {n} points, noise {sigma:g}": (
-            lambda seed, of=(depth, u, half, n, sigma): layout(seed, *of, turning=False)
+        f"{depth}, u {u}, half width {half:g}, {n} points, noise {noise_std:g}": (
+            lambda seed, of=(depth, u, half, n, noise_std): layout(seed, *of, turning=False)
         )
-        for depth, u, half, n, sigma in NARROW
+        for depth, u, half, n, noise_std in NARROW
     },
     "around": {
-        f"{depth}, u {u}, half width {half:g}, {n} points, noise {sigma:g}": (
-            lambda seed, of=(depth, u, half, n, sigma): layout(seed, *of, turning=True)
+        f"{depth}, u {u}, half width {half:g}, {n} points, noise {noise_std:g}": (
+            lambda seed, of=(depth, u, half, n, noise_std): layout(seed, *of, turning=True)
         )
-        for depth, u, half, n, sigma in AROUND
+        for depth, u, half, n, noise_std in AROUND
     },
     "mover": {"a thing that moves by itself, robust": mover},
     "few": {"20 to 60 points, outliers, noise not told": few_points},

@@ -43,7 +43,7 @@ def fixed_values() -> list[Row]:
     points = np.stack(np.meshgrid(side, side), -1).reshape(-1, 2)
     nu = scenes.depths("smooth", points / 0.6, np.random.default_rng(0))
     for name, figures in GRID.items():
-        bound = motion3d.motion_bound(points, *scenes.motion(name), nu, sigma=0.1)
+        bound = motion3d.motion_bound(points, *scenes.motion(name), nu, noise_std=0.1)
         for what, covariance, published in zip(
             ("CRLB", "(17)", "(25)"),
             (bound.crlb, bound.ml_covariance, bound.ideal_covariance),
@@ -58,7 +58,7 @@ def fixed_values() -> list[Row]:
                 ("direction, deg", "w_x, mrad", "w_y, mrad", "w_z, mrad"), published, got, strict=True
             ):
                 tell(f"21 x 21 grid, {name}, {what}: {part}", figure, value)
-    sideways = motion3d.lateral_bound(np.linspace(0.5, 1.5, 101), sigma=0.3)
+    sideways = motion3d.lateral_bound(np.linspace(0.5, 1.5, 101), noise_std=0.3)
     tell("one unknown (29)", 8.8940e-4, sideways.ml_variance)
     tell("one unknown (31)", 8.9109e-4, sideways.ones_variance)
     tell("one unknown, CRLB", 8.2128e-4, sideways.crlb)

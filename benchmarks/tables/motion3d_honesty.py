@@ -85,11 +85,11 @@ def trial(seed: int) -> Trial:
     nu = DEPTHS[depth](shape, rng)
     g, r = scenes.rows(half * shape)
     moved = nu[:, None] * (g @ u)
-    sigma = np.exp(rng.uniform(np.log(0.01), np.log(0.3))) * np.median(np.linalg.norm(moved, axis=1))
+    noise_std = np.exp(rng.uniform(np.log(0.01), np.log(0.3))) * np.median(np.linalg.norm(moved, axis=1))
     return Trial(
         depth,
         half,
-        scenes.Scene(half * shape, moved + r @ w + sigma * rng.normal(size=(n, 2)), nu, u, w, float(sigma)),
+        scenes.Scene(half * shape, moved + r @ w + noise_std * rng.normal(size=(n, 2)), nu, u, w, float(noise_std)),
     )
 
 
@@ -106,7 +106,7 @@ def verdict(each: Trial, robust: bool) -> Verdict:
     """Status of the estimate with known noise, whether it is wrong, whether its ellipse holds."""
     make = each.scene
     found = motion3d.estimate_motion(
-        make.points, make.flow, sigma=make.sigma, placement="start", robust=robust
+        make.points, make.flow, noise_std=make.noise_std, placement="start", robust=robust
     )
     if found.status != "ok":
         return Verdict(found.status, False, False)

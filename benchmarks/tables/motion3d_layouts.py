@@ -77,8 +77,8 @@ def estimated(seed: int, layout: str, ratio: float = 1.0) -> Estimated:
     nu = np.maximum(SURFACES[seed % len(SURFACES)](shape, rng), 0.02)
     g, r = scenes.rows(half * shape)
     moved = nu[:, None] * (g @ u)
-    sigma = np.exp(rng.uniform(np.log(0.003), np.log(0.2))) * np.median(np.linalg.norm(moved, axis=1))
-    roots = _roots(n, ratio, float(sigma), rng)
+    noise_std = np.exp(rng.uniform(np.log(0.003), np.log(0.2))) * np.median(np.linalg.norm(moved, axis=1))
+    roots = _roots(n, ratio, float(noise_std), rng)
     flow = moved + r @ w + np.einsum("kij,kj->ki", roots, rng.normal(size=(n, 2)))
     return (
         motion3d.estimate_motion(half * shape, flow, cov=roots @ roots.transpose(0, 2, 1), placement="start"),
@@ -99,10 +99,10 @@ def thing(seed: int, ratio: float) -> Estimated:
     ]
     g, r = scenes.rows(half * shape)
     moved = nu[:, None] * (g @ u)
-    sigma = float(np.exp(rng.uniform(np.log(0.003), np.log(0.1))) * np.median(np.linalg.norm(moved, axis=1)))
+    noise_std = float(np.exp(rng.uniform(np.log(0.003), np.log(0.1))) * np.median(np.linalg.norm(moved, axis=1)))
     flow = moved + r @ w
     flow[near] = 1.5 * nu[near, None] * (g[near] @ _unit(rng)) + r[near] @ (0.03 * _unit(rng))
-    roots = _roots(n, ratio, sigma, rng)
+    roots = _roots(n, ratio, noise_std, rng)
     flow += np.einsum("kij,kj->ki", roots, rng.normal(size=(n, 2)))
     return (
         motion3d.estimate_motion(
@@ -141,10 +141,10 @@ def band(seed: int) -> Estimated:
     u /= np.linalg.norm(u)
     g, r = scenes.rows(half * shape)
     moved = nu[:, None] * (g @ u)
-    sigma = float(np.exp(rng.uniform(np.log(0.002), np.log(0.1))) * np.median(np.linalg.norm(moved, axis=1)))
+    noise_std = float(np.exp(rng.uniform(np.log(0.002), np.log(0.1))) * np.median(np.linalg.norm(moved, axis=1)))
     return (
         motion3d.estimate_motion(
-            half * shape, moved + r @ w + sigma * rng.normal(size=(n, 2)), sigma=sigma, placement="start"
+            half * shape, moved + r @ w + noise_std * rng.normal(size=(n, 2)), noise_std=noise_std, placement="start"
         ),
         u,
         w,
@@ -164,9 +164,9 @@ def views(seed: int, depth: str, noise: float) -> Estimated:
     pixels = [320, 240] + 500 * half * shape
     still = scenes.displaced(pixels, 0 * nu, u, w)
     moved = scenes.displaced(pixels, nu, u, w)
-    sigma = noise * float(np.median(np.linalg.norm(moved - still, axis=1)))
-    flow = moved - pixels + sigma * rng.normal(size=(n, 2))
-    return motion3d.estimate_motion(pixels, flow, scenes.K, sigma=sigma), u, w
+    noise_std = noise * float(np.median(np.linalg.norm(moved - still, axis=1)))
+    flow = moved - pixels + noise_std * rng.normal(size=(n, 2))
+    return motion3d.estimate_motion(pixels, flow, scenes.K, noise_std=noise_std), u, w
 
 
 VIEWS = (("waves", 0.03), ("waves", 0.1), ("cloud", 0.1), ("cloud", 0.3), ("plane", 0.01), ("plane", 0.05))
@@ -178,13 +178,13 @@ def _unit(rng: np.random.Generator) -> Array:
     return vector / np.linalg.norm(vector)
 
 
-def _roots(n: int, ratio: float, sigma: float, rng: np.random.Generator) -> Array:
-    """Roots of covariances with `sigma` as the geometric mean of their axes."""
+def _roots(n: int, ratio: float, noise_std: float, rng: np.random.Generator) -> Array:
+    """Roots of covariances with `noise_std` as the geometric mean of their axes."""
     angle = rng.uniform(0, np.pi, n)
     turned = np.stack(
         [np.stack([np.cos(angle), -np.sin(angle)], 1), np.stack([np.sin(angle), np.cos(angle)], 1)], 1
     )
-    return turned * (sigma * np.array([ratio**0.5, ratio**-0.5]))
+    return turned * (noise_std * np.array([ratio**0.5, ratio**-0.5]))
 
 
 def cases(only: list[str] | None = None) -> dict[str, Callable[[int], Estimated]]:

@@ -41,25 +41,25 @@ THEORY = (
 def theory(trials: int) -> list[Row]:
     """ML at the minimum nearest to the truth: it follows its predicted covariance (17) and not the bound."""
     rows: list[Row] = []
-    for depth, name, n, sigma, asked in THEORY:
+    for depth, name, n, noise_std, asked in THEORY:
         errors, spreads, distances = [], [], []
         for seed in range(max(20, trials // 4) if n == 5000 else trials):
             make = (
-                scenes.sphere(name, n, sigma, seed)
+                scenes.sphere(name, n, noise_std, seed)
                 if depth == "sphere"
-                else scenes.differential(depth, name, n, sigma, seed)
+                else scenes.differential(depth, name, n, noise_std, seed)
             )
             found = motion3d.estimate_motion(
                 make.points,
                 make.flow,
-                sigma=sigma,
+                noise_std=noise_std,
                 projection=make.projection,
                 placement="start",
                 method="ml",
                 initial=(make.u, make.w),
             )
             bound = motion3d.motion_bound(
-                make.points, make.u, make.w, make.depths, sigma=sigma, projection=make.projection
+                make.points, make.u, make.w, make.depths, noise_std=noise_std, projection=make.projection
             )
             delta = np.concatenate([bound.tangent @ found.translation, found.rotation - make.w])
             errors.append(angle(found.translation, make.u))
@@ -68,7 +68,7 @@ def theory(trials: int) -> list[Row]:
         spread, distance = np.sqrt(np.mean(np.square(spreads), 0)), np.mean(distances, 0)
         got = (rms(errors), spread[1], spread[0], *distance)
         names = ("ML rms", "(17)", "CRLB", "m(17)", "m(CRLB)")
-        row: Row = {"case": f"{depth} {name} n={n} sigma {sigma}", "trials": len(errors)}
+        row: Row = {"case": f"{depth} {name} n={n} sigma {noise_std}", "trials": len(errors)}
         for column, value, figure in zip(names, got, asked, strict=True):
             row[column], row[f"{column} asked"] = round(float(value), 2), figure
         rows.append(row)
@@ -86,14 +86,14 @@ TRUE_WEIGHTS = (
 def true_weights(trials: int) -> list[Row]:
     """Ideal weights are reached with the true depths (25)."""
     rows: list[Row] = []
-    for depth, sigma, asked in TRUE_WEIGHTS:
+    for depth, noise_std, asked in TRUE_WEIGHTS:
         errors, plain, spreads = [], [], []
         for seed in range(trials):
-            make = scenes.differential(depth, "oblique", 500, sigma, seed)
+            make = scenes.differential(depth, "oblique", 500, noise_std, seed)
             found = motion3d.estimate_motion(
                 make.points,
                 make.flow,
-                sigma=sigma,
+                noise_std=noise_std,
                 placement="start",
                 initial=(make.u, make.w),
                 method="efficient",
@@ -102,10 +102,10 @@ def true_weights(trials: int) -> list[Row]:
             errors.append(angle(found.translation, make.u))
             plain.append(angle(found.ml.translation, make.u))
             spreads.append(
-                motion3d.motion_bound(make.points, make.u, make.w, make.depths, sigma=sigma).direction_std[2]
+                motion3d.motion_bound(make.points, make.u, make.w, make.depths, noise_std=noise_std).direction_std[2]
             )
         got = (rms(errors), rms(spreads), rms(plain))
-        row: Row = {"case": f"{depth} oblique n=500 sigma {sigma}", "trials": trials}
+        row: Row = {"case": f"{depth} oblique n=500 sigma {noise_std}", "trials": trials}
         for column, value, figure in zip(("true depths rms", "(25)", "ML rms"), got, asked, strict=True):
             row[column], row[f"{column} asked"] = round(value, 2), figure
         rows.append(row)
@@ -126,20 +126,20 @@ def one_unknown(trials: int) -> list[Row]:
     rng = np.random.default_rng(5)
     for n, sigmas in ((1000, (0.1, 0.30369, 0.6, 1.0)), (50, (1.0,))):
         nu = np.linspace(0.5, 1.5, n)
-        for sigma in sigmas:
-            bound = motion3d.lateral_bound(nu, sigma=sigma)
+        for noise_std in sigmas:
+            bound = motion3d.lateral_bound(nu, noise_std=noise_std)
             errors: dict[str, list[float]] = {weights: [] for weights in ONE_UNKNOWN.values()}
             inside: list[bool] = []
             for _ in range(trials):
-                flow = np.stack([nu, 0 * nu], -1) + sigma * rng.normal(size=(n, 2))
+                flow = np.stack([nu, 0 * nu], -1) + noise_std * rng.normal(size=(n, 2))
                 for weights in errors:
                     errors[weights].append(
-                        motion3d.estimate_lateral(flow, sigma=sigma, weights=weights).angle
+                        motion3d.estimate_lateral(flow, noise_std=noise_std, weights=weights).angle
                     )  # type: ignore[arg-type]
                 unknown = motion3d.estimate_lateral(flow)
                 inside.append(unknown.angle**2 < 1.96**2 * unknown.variance)
             predicted = (bound.ml_variance, bound.ones_variance, bound.shrunk_variance)
-            row: Row = {"n": n, "sigma": sigma, "crossover": round(bound.crossover, 4), "trials": trials}
+            row: Row = {"n": n, "sigma": noise_std, "crossover": round(bound.crossover, 4), "trials": trials}
             for (name, weights), figure in zip(ONE_UNKNOWN.items(), predicted, strict=True):
                 row[name] = round(float(np.mean(np.square(errors[weights])) / figure), 3)
             row["shrunk / best of both"] = round(
@@ -197,13 +197,13 @@ def practical(trials: int) -> list[Row]:
     """The search everywhere: rms errors of the direction in degrees, of the rotation in mrad, and how
     often the 95 % ellipsoid holds the truth."""
     rows: list[Row] = []
-    for depth, name, n, sigma, h, asked in PRACTICAL:
+    for depth, name, n, noise_std, h, asked in PRACTICAL:
         columns: dict[str, list[float]] = {column: [] for column in PRACTICAL_COLUMNS}
         inside, plain, newton, count = [], [], [], max(20, trials // 3) if n == 5000 else trials
         for seed in range(count):
-            make = scenes.differential(depth, name, n, sigma, seed, h)
-            run = lambda make=make, sigma=sigma, **options: motion3d.estimate_motion(
-                make.points, make.flow, sigma=sigma, placement="start", **options
+            make = scenes.differential(depth, name, n, noise_std, seed, h)
+            run = lambda make=make, noise_std=noise_std, **options: motion3d.estimate_motion(
+                make.points, make.flow, noise_std=noise_std, placement="start", **options
             )
             found, ideal = (
                 run(method="efficient"),
@@ -216,7 +216,7 @@ def practical(trials: int) -> list[Row]:
             columns["CRLB"].append(
                 float(
                     motion3d.motion_bound(
-                        make.points, make.u, make.w, make.depths, sigma=sigma
+                        make.points, make.u, make.w, make.depths, noise_std=noise_std
                     ).direction_std[0]
                 )
             )
@@ -230,7 +230,7 @@ def practical(trials: int) -> list[Row]:
             if (usual := gauss_newton(likelihood)) is not None:
                 newton.append(holds(make, likelihood, usual))
         row: Row = {
-            "case": f"{depth} {name} n={n} sigma {sigma}" + (f" h={h}" if h != 0.6 else ""),
+            "case": f"{depth} {name} n={n} sigma {noise_std}" + (f" h={h}" if h != 0.6 else ""),
             "trials": count,
         }
         for (column, values), figure in zip(columns.items(), asked, strict=True):
@@ -328,16 +328,16 @@ def pixels(trials: int) -> list[Row]:
     below (17).
     """
     rows: list[Row] = []
-    for depth, name, sigma, median, disturbed, asked in PIXELS:
+    for depth, name, noise_std, median, disturbed, asked in PIXELS:
         columns: dict[str, list[float]] = {column: [] for column in ("ML", "efficient", *rivals.METHODS)}
         turns: dict[str, list[float]] = {column: [] for column in ("efficient", *rivals.METHODS)}
         labels, ideal, predicted = [], [], []
         inside: dict[str, list[bool]] = {"sigma": [], "unknown sigma": []}
         robust = bool(disturbed)
         for seed in range(trials):
-            make = scenes.two_views(depth, name, sigma, median, seed, **disturbed)  # type: ignore[arg-type]
+            make = scenes.two_views(depth, name, noise_std, median, seed, **disturbed)  # type: ignore[arg-type]
             found = motion3d.estimate_motion(
-                make.points, make.flow, scenes.K, sigma=sigma, robust=robust, method="efficient"
+                make.points, make.flow, scenes.K, noise_std=noise_std, robust=robust, method="efficient"
             )
             columns["ML"].append(angle(found.ml.translation, make.u))
             columns["efficient"].append(angle(found.translation, make.u))
@@ -354,27 +354,27 @@ def pixels(trials: int) -> list[Row]:
                 ideal.append(
                     angle(
                         motion3d.estimate_motion(
-                            make.points, make.flow, scenes.K, sigma=sigma, method="efficient", **near
+                            make.points, make.flow, scenes.K, noise_std=noise_std, method="efficient", **near
                         ).translation,
                         make.u,
                     )
                 )  # type: ignore[arg-type]
                 predicted.append(
                     motion3d.motion_bound(
-                        make.points, make.u, make.w, make.depths, scenes.K, sigma=sigma
+                        make.points, make.u, make.w, make.depths, scenes.K, noise_std=noise_std
                     ).direction_std[:2]
                 )
             turn, mean = scenes.exponential(make.w)
             for column, method in rivals.METHODS.items():
                 if rivals.cv2 is None:
                     continue
-                direction, rotation = rivals.two_view(make.points, make.flow, scenes.K, sigma, method)
+                direction, rotation = rivals.two_view(make.points, make.flow, scenes.K, noise_std, method)
                 columns[column].append(angle(direction, mean @ make.u))
                 turns[column].append(
                     1e3 * float(np.arccos(np.clip((np.trace(rotation.T @ turn) - 1) / 2, -1, 1)))
                 )
         words = "".join(f", {value:.0%} {what}" for what, value in disturbed.items())
-        row: Row = {"case": f"{depth} {name} {sigma} px, {median} px{words}", "trials": trials}
+        row: Row = {"case": f"{depth} {name} {noise_std} px, {median} px{words}", "trials": trials}
         for (column, values), figure in zip(columns.items(), asked, strict=True):
             row[column], row[f"{column} asked"] = both(values) if values else "", figure
         row["true depths"] = both(ideal) if ideal else ""

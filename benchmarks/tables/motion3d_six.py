@@ -32,7 +32,7 @@ LAYOUTS, NEAREST = 400, 8
 
 def six_bounds(make: scenes.Scene, covariance: Array) -> tuple[float, float]:
     """Bounds of the direction's standard deviation, degrees: of flow alone and of six numbers."""
-    flow = motion3d.motion_bound(make.points, make.u, make.w, make.depths[:, 0], scenes.K, sigma=make.sigma)
+    flow = motion3d.motion_bound(make.points, make.u, make.w, make.depths[:, 0], scenes.K, noise_std=make.noise_std)
     six = motion3d.motion_bound(
         make.points, make.u, make.w, make.depths, scenes.K, cov=covariance, jacobian=True
     )
@@ -40,12 +40,12 @@ def six_bounds(make: scenes.Scene, covariance: Array) -> tuple[float, float]:
 
 
 def like_the_published(
-    h: float, n: int, radius: int, sigma: float, asked: Sequence[float]
+    h: float, n: int, radius: int, noise_std: float, asked: Sequence[float]
 ) -> tuple[list[int], str]:
     """Seeds of the layouts whose bounds are nearest to the published ones, and the range of the bounds of
     flow alone among 90 % of all."""
     bounds = np.array(
-        [six_bounds(*scenes.patches("oblique", n, radius, sigma, seed, h)[::2]) for seed in range(LAYOUTS)]
+        [six_bounds(*scenes.patches("oblique", n, radius, noise_std, seed, h)[::2]) for seed in range(LAYOUTS)]
     )
     off = np.abs(np.log(bounds / asked[4:])).max(1)
     low, high = np.quantile(bounds[:, 0], (0.05, 0.95))
@@ -59,13 +59,13 @@ def six_numbers(trials: int) -> list[Row]:
     layouts, one for each trial, and for those with the published bounds.
     """
     rows: list[Row] = []
-    for h, n, radius, sigma, asked in SIX:
-        case = f"oblique h={h} n={n} r={radius} sigma {sigma} px"
-        like, spread = like_the_published(h, n, radius, sigma, asked)
+    for h, n, radius, noise_std, asked in SIX:
+        case = f"oblique h={h} n={n} r={radius} sigma {noise_std} px"
+        like, spread = like_the_published(h, n, radius, noise_std, asked)
         made = {
-            "drawn anew": [scenes.patches("oblique", n, radius, sigma, seed, h) for seed in range(trials)],
+            "drawn anew": [scenes.patches("oblique", n, radius, noise_std, seed, h) for seed in range(trials)],
             "with the published bounds": [
-                scenes.patches("oblique", n, radius, sigma, like[t % NEAREST], h, t) for t in range(trials)
+                scenes.patches("oblique", n, radius, noise_std, like[t % NEAREST], h, t) for t in range(trials)
             ],
         }
         for layouts, drawn in made.items():
@@ -89,7 +89,7 @@ def six_row(drawn: list[tuple[scenes.Scene, Array, Array]], asked: Sequence[floa
     for make, jacobian, covariance in drawn:
         near = {"placement": "start", "initial": (make.u, make.w), "method": "efficient"}
         flow = motion3d.estimate_motion(
-            make.points, make.flow, scenes.K, sigma=make.sigma, smoother="prior", **near
+            make.points, make.flow, scenes.K, noise_std=make.noise_std, smoother="prior", **near
         )  # type: ignore[arg-type]
         six = motion3d.estimate_motion(
             make.points, make.flow, scenes.K, cov=covariance, jacobian=jacobian, **near

@@ -28,7 +28,7 @@ def speed(rounds: int) -> list[Row]:
 
         def ours(options: dict[str, object], threads: int, make: scenes.Scene = make) -> object:
             return motion3d.estimate_motion(
-                make.points, make.flow, scenes.K, sigma=0.3, threads=threads, **options
+                make.points, make.flow, scenes.K, noise_std=0.3, threads=threads, **options
             )  # type: ignore[arg-type]
 
         def theirs(method: str, make: scenes.Scene = make) -> object:

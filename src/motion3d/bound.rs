@@ -114,7 +114,7 @@ pub(crate) fn too_few(least: usize, finite: usize) -> Error {
 
 pub(crate) fn check_truth(noise: &Noise<'_>, motion: &Motion) -> Result<()> {
     if matches!(noise, Noise::Unknown) {
-        return Err(Error::argument("sigma", "the noise of the flow, as sigma or cov", "none"));
+        return Err(Error::argument("noise_std", "the noise of the flow, as noise_std or cov", "none"));
     }
     check_motion(&motion.translation, &motion.rotation)
 }

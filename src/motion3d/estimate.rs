@@ -20,12 +20,13 @@ const MIN_POINTS: usize = 5;
 /// The rigid motion that explains a flow field, with covariance and depths.
 ///
 /// Maximum likelihood by a search over all directions, then the estimating equation with smoothed weights
-/// (see the module). Units: with a camera flow is in px/frame and `sigma` in px. Rows that are not finite are
-/// left out and come back as NaN. Degenerate scenes are reported in
+/// (see the module). Units: with a camera flow is in px/frame and `noise_std` in px. Rows that are not finite
+/// are left out and come back as NaN. Degenerate scenes are reported in
 /// [`MotionEstimate::status`], not as errors. Everything is computed in double precision.
 ///
 /// # Errors
-/// [`Argument`](crate::error::Error::Argument) naming what has the wrong length or value: `flow`, `sigma`,
+/// [`Argument`](crate::error::Error::Argument) naming what has the wrong length or value: `flow`,
+/// `noise_std`,
 /// `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`, `points_per_independent_sample`,
 /// `correlation_length`.
 pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
@@ -35,10 +36,10 @@ pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptio
 }
 
 fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> MotionEstimate {
-    let sigma = if let Noise::Sigma(sigma) = noise { *sigma } else { 1.0 };
+    let noise_std = if let Noise::StandardDeviation(noise_std) = noise { *noise_std } else { 1.0 };
     let whitening = Whitening::new(flow, noise, options.placement);
     let unknown = matches!(noise, Noise::Unknown);
-    let mut scaled = Scaled { observations: whitening.whitened(), sigma, unknown, may_turn: true };
+    let mut scaled = Scaled { observations: whitening.whitened(), noise_std, unknown, may_turn: true };
     if let Some(depths) = &options.weight_depths {
         let known = |k: &u32| depths[scaled.observations.source[*k as usize] as usize].is_finite();
         let chosen: Vec<u32> = (0..scaled.observations.n as u32).filter(known).collect();
@@ -47,18 +48,18 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         }
     }
     if scaled.observations.n < MIN_POINTS {
-        let sigma = if scaled.unknown { f64::NAN } else { sigma };
-        return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, sigma);
+        let noise_std = if scaled.unknown { f64::NAN } else { noise_std };
+        return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, noise_std);
     }
     scaled.observations.points_per_independent_sample = options.points_per_independent_sample.unwrap_or(1.0);
-    let alone = |told: Option<f64>, usual: f64| told.is_none_or(|told| told == usual);
+    let alone = |given: Option<f64>, usual: f64| given.is_none_or(|given| given == usual);
     scaled.observations.independent =
         alone(options.points_per_independent_sample, 1.0) && alone(options.correlation_length, 0.0);
     if unknown && options.rotation_prior.is_some() {
         // What is known beforehand weighs nothing beside flow of no noise, and it does not determine
         // how large that is.
         let alone = estimate(flow, noise, &MotionOptions { rotation_prior: None, ..options.clone() });
-        scaled.take(alone.sigma);
+        scaled.take(alone.noise_std);
         scaled.may_turn = alone.status == Status::RotationOnly;
     }
     scaled.observations.prior = options.rotation_prior.as_ref().and_then(RotationPrior::information);
@@ -72,14 +73,14 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         && let Some(rotation) = explained_by_rotation_in_unknown_noise(&scaled.observations, 0.0)
     {
         // Nothing is left that noise could be estimated from, but for rounding.
-        let (before, left) = (scaled.sigma, (rotation.chi2 / (2 * scaled.observations.n - 3) as f64).sqrt());
+        let (before, left) = (scaled.noise_std, (rotation.chi2 / (2 * scaled.observations.n - 3) as f64).sqrt());
         scaled.take(left);
-        let (all, rotation) = (&scaled.observations, rotation.in_units(before / scaled.sigma));
-        return rotation_report(flow, all, all, &rotation, scaled.sigma, options);
+        let (all, rotation) = (&scaled.observations, rotation.in_units(before / scaled.noise_std));
+        return rotation_report(flow, all, all, &rotation, scaled.noise_std, options);
     }
     if options.robust {
         let Some(kept) = consensus(&whitening, &mut scaled, rng.stream(1)) else {
-            return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
+            return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.noise_std);
         };
         let inner = scaled.observations.subset(&kept.inner);
         let task = Task { whitening: &whitening, options, known: Some(&kept), rng };
@@ -90,7 +91,14 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         if !scaled.unknown
             && let Some(rotation) = explained_by_rotation(&scaled.observations)
         {
-            return rotation_report(flow, &scaled.observations, &scaled.observations, &rotation, scaled.sigma, options);
+            return rotation_report(
+                flow,
+                &scaled.observations,
+                &scaled.observations,
+                &rotation,
+                scaled.noise_std,
+                options,
+            );
         }
         let inliers = scaled.observations.clone();
         Task { whitening: &whitening, options, known: None, rng }.on(&mut scaled, inliers)

@@ -218,7 +218,7 @@ const FIELD_SITES: f64 = 4000.0;
 
 /// Estimated from covariances. The factor: by the whole error of the points that determine it
 /// best. Of each point, its flow and the covariance of that.
-fn told_by(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> CommonErrors {
+fn common_errors(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> CommonErrors {
     let (mut squares, mut variances) = (Vec::new(), Vec::new());
     for (flow, covariance) in points {
         let square = covariance.cholesky().map(|factor| flow.dot(&factor.solve(&flow)));
@@ -240,13 +240,13 @@ pub(crate) fn of_field<T: Real>(field: &FlowField<T>) -> CommonErrors {
     let sites = (0..field.height)
         .step_by(step)
         .flat_map(|row| (0..field.width).step_by(step).map(move |column| row * field.width + column));
-    let told = |site: usize| {
+    let measurement = |site: usize| {
         let valid = field.status[site].is_valid() && field.status[site] != Status::Inconsistent;
         let covariance = field.covariance_at(site).filter(|_| valid)?;
         let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
         Some((Vector2::new(u, v), Matrix2::from_fn(|i, j| covariance[i][j])))
     };
-    told_by(sites.filter_map(told))
+    common_errors(sites.filter_map(measurement))
 }
 
 #[cfg(test)]
@@ -316,8 +316,8 @@ mod tests {
         assert_eq!((rest.points.len(), rest.flow.len(), rest.covariances.len()), (12, 12, 48));
         assert!(rest.points.iter().all(|&[x, y]| !within(region, x as usize, y as usize)));
         // A given spacing stays.
-        let asked = inside(FieldOptions { region, spacing: Some(10.0), ..FieldOptions::default() });
-        assert_eq!((asked.spacing, asked.points.len()), (10.0, 12));
+        let given = inside(FieldOptions { region, spacing: Some(10.0), ..FieldOptions::default() });
+        assert_eq!((given.spacing, given.points.len()), (10.0, 12));
     }
 
     #[test]
@@ -329,12 +329,12 @@ mod tests {
     }
 
     #[test]
-    fn both_are_told_by_points() {
+    fn both_are_estimated_from_points() {
         let point = |length: f64| (Vector2::new(length, 0.0), Matrix2::identity() * 0.04);
-        let common = told_by([1.0, 4.0, 9.0].into_iter().map(point));
+        let common = common_errors([1.0, 4.0, 9.0].into_iter().map(point));
         // A flow of 45 deviations, and one point's of 0.2.
         assert!((common.scale - (2.0f64 / 2025.0).sqrt()).abs() < 1e-12, "{common:?}");
         assert!((common.offset - SHARE * 0.2).abs() < 1e-12, "{common:?}");
-        assert_eq!(told_by(std::iter::empty()).scale, 1.0);
+        assert_eq!(common_errors(std::iter::empty()).scale, 1.0);
     }
 }

@@ -31,7 +31,7 @@ const CHOICES: usize = 4;
 /// Times that is done where smoothed weights prefer another minimum, and the squared shift, in deviations, by
 /// which a motion is another one than that whose rotation is taken out.
 const AGAIN: usize = 2;
-const ASTRAY: f64 = 1.0;
+const MAX_SHIFT: f64 = 1.0;
 
 /// The inliers of one motion with the options of the fit.
 pub(crate) struct Task<'a, 'b> {
@@ -49,7 +49,7 @@ struct Solved {
     deviation: f64,
     low: bool,
     /// Whether the covariance describes the shape of the confidence region.
-    told: bool,
+    described: bool,
     undecided: Option<Alternative>,
 }
 
@@ -59,16 +59,16 @@ impl Task<'_, '_> {
         let flow = self.whitening.flow;
         let mut found = self.begin(&inliers, scaled.unknown);
         let Some(&first) = found.first() else {
-            return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.sigma);
+            return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.noise_std);
         };
         settle(self.whitening, &mut scaled.observations, &mut inliers, &mut found, &first, scaled.unknown);
         let cost = found[0].equations.cost - inliers.pulled(&found[0].motion.w());
-        if let Some(told) = self.without_translation(scaled, &mut inliers, cost) {
-            return told;
+        if let Some(estimate) = self.without_translation(scaled, &mut inliers, cost) {
+            return estimate;
         }
         if scaled.unknown {
-            let sigma = (cost / inliers.n.saturating_sub(5).max(1) as f64).sqrt();
-            rescaled(scaled, &mut inliers, sigma);
+            let noise_std = (cost / inliers.n.saturating_sub(5).max(1) as f64).sqrt();
+            rescaled(scaled, &mut inliers, noise_std);
             found = found
                 .iter()
                 .map(|minimum| refine(&inliers, minimum.motion, None, StoppingCriteria::of(inliers.n)))
@@ -77,12 +77,12 @@ impl Task<'_, '_> {
         let (mut candidates, made) = self.chosen(scaled, &mut inliers, found);
         let mut solved = self.solved(&inliers, &candidates, made);
         for round in 0..=AGAIN {
-            if shift(self.whitening, &inliers, &solved.solution.motion) <= ASTRAY {
+            if shift(self.whitening, &inliers, &solved.solution.motion) <= MAX_SHIFT {
                 break;
             }
             // Undetermined: the points were derotated about a different rotation.
             if round == AGAIN {
-                solved.told = false;
+                solved.described = false;
                 break;
             }
             (candidates, solved) = self.solved_there(scaled, &mut inliers, &candidates, &solved.solution.motion);
@@ -97,12 +97,12 @@ impl Task<'_, '_> {
             .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
             .collect();
         let competing: &[CompetingMotion] = self.known.map_or(&[], |known| &known.competing);
-        let Solved { mut solution, deviation, low, told, undecided } = solved;
+        let Solved { mut solution, deviation, low, described, undecided } = solved;
         let likelihood = (*candidates[0].motion(), candidates[0].minimum.equations.behind);
         let unknown = scaled.unknown;
-        let evidence = Evidence { likelihood, deviation, low, told, unknown, competing, undecided };
+        let evidence = Evidence { likelihood, deviation, low, described, unknown, competing, undecided };
         judge(self.whitening, &inliers, &mut solution, &evidence, self.rng.stream(4));
-        report(flow, &scaled.observations, &inliers, &solution, scaled.sigma)
+        report(flow, &scaled.observations, &inliers, &solution, scaled.noise_std)
     }
 
     /// The minima of the likelihood.
@@ -130,14 +130,21 @@ impl Task<'_, '_> {
         } else if scaled.unknown {
             let rotation = explained_by_rotation_in_unknown_noise(inliers, cost)?;
             let left = rotation.chi2 - inliers.pulled(&rotation.rotation);
-            let sigma = (left / (2 * inliers.n - 3) as f64).sqrt();
-            rotation.in_units(rescaled(scaled, inliers, sigma))
+            let noise_std = (left / (2 * inliers.n - 3) as f64).sqrt();
+            rotation.in_units(rescaled(scaled, inliers, noise_std))
         } else if self.options.robust {
             explained_by_rotation(inliers)?
         } else {
             return None;
         };
-        Some(rotation_report(self.whitening.flow, &scaled.observations, inliers, &rotation, scaled.sigma, self.options))
+        Some(rotation_report(
+            self.whitening.flow,
+            &scaled.observations,
+            inliers,
+            &rotation,
+            scaled.noise_std,
+            self.options,
+        ))
     }
 
     /// The minima in the order of preference; the first has its own rotation taken out of the points.
@@ -213,8 +220,8 @@ impl Task<'_, '_> {
         let beyond = |plugged: &PluginCovariances| {
             beyond_theory(inliers, &chosen.minimum, plugged) || valley.bent(&plugged.likelihood) > 0
         };
-        let astray = plugged.as_ref().is_some_and(beyond);
-        let trial = if wanted || low || several || astray {
+        let nonlinear = plugged.as_ref().is_some_and(beyond);
+        let trial = if wanted || low || several || nonlinear {
             smoothed(inliers, self.options, candidates, made, || self.smoother(inliers))
         } else {
             None
@@ -223,14 +230,14 @@ impl Task<'_, '_> {
         if let Some(best) = improved.as_ref().filter(|_| !wanted) {
             undecided = preferred_to(best, &chosen, plugged.as_ref()).or(undecided);
         }
-        let mut improved = improved.filter(|_| wanted || low || astray);
+        let mut improved = improved.filter(|_| wanted || low || nonlinear);
         // Maximum likelihood alone is undetermined beyond its theory.
-        let mut told = plugged.as_ref().is_none_or(|plugged| valley.bent(&plugged.likelihood) == 0);
+        let mut described = plugged.as_ref().is_none_or(|plugged| valley.bent(&plugged.likelihood) == 0);
         if let Some(best) = &mut improved {
-            (best.covariance, told) = best.lengthened(inliers, || self.smoother(inliers));
+            (best.covariance, described) = best.lengthened(inliers, || self.smoother(inliers));
         }
         // From where they lead nowhere the minimum is a spurious one.
-        told &= improved.is_some() || !wanted;
+        described &= improved.is_some() || !wanted;
         let unknown = low && improved.is_none();
         let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
         if unknown {
@@ -239,7 +246,7 @@ impl Task<'_, '_> {
             solution.covariance = at.map(|at| at.covariance);
         }
         let deviation = plugged.as_ref().map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
-        Solved { solution, deviation, low, told, undecided }
+        Solved { solution, deviation, low, described, undecided }
     }
 
     /// Takes into account what a linear theory of independent inliers of known noise leaves out.
@@ -307,12 +314,12 @@ fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
     )
 }
 
-/// Takes `sigma` to be the noise of all points and of the inliers; returns what everything was multiplied
+/// Takes `noise_std` to be the noise of all points and of the inliers; returns what everything was multiplied
 /// with.
-fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, sigma: f64) -> f64 {
-    let before = scaled.sigma;
-    scaled.take(sigma);
-    let factor = before / scaled.sigma;
+fn rescaled(scaled: &mut Scaled, inliers: &mut Observations, noise_std: f64) -> f64 {
+    let before = scaled.noise_std;
+    scaled.take(noise_std);
+    let factor = before / scaled.noise_std;
     inliers.rescale(factor);
     factor
 }

@@ -62,9 +62,9 @@ pub struct LateralEstimate {
     /// The Cramér-Rao bound with the same moments, rad^2.
     pub bound: f64,
     /// Standard deviation of each component of the flow: as given, else estimated.
-    pub sigma: f64,
+    pub noise_std: f64,
     /// Inverse depths (N), the flow along the direction, in units of `|u|` per frame; their deviation is
-    /// `sigma`. NaN where the flow is not finite.
+    /// `noise_std`. NaN where the flow is not finite.
     pub inverse_depth: Vec<f64>,
 }
 
@@ -169,12 +169,12 @@ fn finite(flow: &[f64; 2]) -> bool {
     flow.iter().all(|value| value.is_finite())
 }
 
-fn check(sigma: f64) -> Result<()> {
+fn check(noise_std: f64) -> Result<()> {
     // The sums of squares that an estimate is made of are of its fourth power.
-    if sigma > 0.0 && sigma.powi(4).is_normal() {
+    if noise_std > 0.0 && noise_std.powi(4).is_normal() {
         return Ok(());
     }
-    Err(Error::argument("sigma", "a positive number between 1e-75 and 1e75", sigma))
+    Err(Error::argument("noise_std", "a positive number between 1e-75 and 1e75", noise_std))
 }
 
 /// Which way along an axis: the one that leaves less behind the camera, in squared deviations.
@@ -191,25 +191,25 @@ fn before(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
 /// at N points wherever they are.
 ///
 /// `flow`: per frame on the plane at distance 1, or px/frame of a camera with square pixels; each component
-/// has the deviation `sigma`, which is estimated from the flow across the direction where it is `None`. Flow
-/// that is not finite is left out. (29) and (31) are of first order: they hold while they are small beside a
-/// radian.
+/// has the deviation `noise_std`, which is estimated from the flow across the direction where it is `None`.
+/// Flow that is not finite is left out. (29) and (31) are of first order: they hold while they are small
+/// beside a radian.
 ///
 /// # Errors
-/// [`Error::Argument`] for a `sigma` that is none and for a `flow` of fewer than two finite vectors (one
-/// where `sigma` is known); [`Error::NotObservable`] when all of the flow, or with weights of 1 its sum, is
-/// zero.
-pub fn estimate_lateral(flow: &[[f64; 2]], sigma: Option<f64>, weights: LateralWeights) -> Result<LateralEstimate> {
-    sigma.map_or(Ok(()), check)?;
+/// [`Error::Argument`] for a `noise_std` that is none and for a `flow` of fewer than two finite vectors (one
+/// where `noise_std` is known); [`Error::NotObservable`] when all of the flow, or with weights of 1 its sum,
+/// is zero.
+pub fn estimate_lateral(flow: &[[f64; 2]], noise_std: Option<f64>, weights: LateralWeights) -> Result<LateralEstimate> {
+    noise_std.map_or(Ok(()), check)?;
     let sums = Sums::of(flow);
-    let least = if sigma.is_some() { 1.0 } else { 2.0 };
+    let least = if noise_std.is_some() { 1.0 } else { 2.0 };
     if sums.n < least {
         return Err(Error::argument("flow", format!("at least {least} finite vectors"), sums.n));
     }
     if !sums.second.iter().all(|sum| sum.is_finite()) {
         return Err(Error::argument("flow", "values whose squares are finite", "larger ones"));
     }
-    let noise = |u: &Vector2<f64>| sigma.map_or_else(|| sums.noise(u), |sigma| sigma * sigma);
+    let noise = |u: &Vector2<f64>| noise_std.map_or_else(|| sums.noise(u), |noise_std| noise_std * noise_std);
     let share = |u: &Vector2<f64>| sums.moments(u, noise(u)).share(weights, noise(u));
     let along = match weights {
         LateralWeights::Ones => sums.first,
@@ -225,7 +225,7 @@ pub fn estimate_lateral(flow: &[[f64; 2]], sigma: Option<f64>, weights: LateralW
         angle: u.y.atan2(u.x),
         variance: moments.variance(moments.share(weights, noise), noise),
         bound: moments.bound(noise),
-        sigma: noise.sqrt(),
+        noise_std: noise.sqrt(),
         inverse_depth: flow.iter().map(|&f| if finite(&f) { u.dot(&Vector2::from(f)) } else { f64::NAN }).collect(),
     })
 }
@@ -233,19 +233,19 @@ pub fn estimate_lateral(flow: &[[f64; 2]], sigma: Option<f64>, weights: LateralW
 /// What any estimator, and each of those of [`estimate_lateral`], makes of points with these true inverse
 /// depths: for the design of an experiment.
 ///
-/// `inverse_depth`: `nu` (N) in units of `|u|` per frame; those that are not finite are left out. `sigma`:
-/// deviation of each component of the flow, in the same unit.
+/// `inverse_depth`: `nu` (N) in units of `|u|` per frame; those that are not finite are left out.
+/// `noise_std`: deviation of each component of the flow, in the same unit.
 ///
 /// # Errors
-/// [`Error::Argument`] for a `sigma` that is none, and an `inverse_depth` without a finite value;
+/// [`Error::Argument`] for a `noise_std` that is none, and an `inverse_depth` without a finite value;
 /// [`Error::NotObservable`] when all are zero.
-pub fn lateral_bound(inverse_depth: &[f64], sigma: f64) -> Result<LateralBound> {
-    check(sigma)?;
+pub fn lateral_bound(inverse_depth: &[f64], noise_std: f64) -> Result<LateralBound> {
+    check(noise_std)?;
     let known: Vec<f64> = inverse_depth.iter().copied().filter(|nu| nu.is_finite()).collect();
     if known.is_empty() {
         return Err(Error::argument("inv_depth", "at least one finite value", "none"));
     }
-    let (moments, noise) = (Moments::of(&known), sigma * sigma);
+    let (moments, noise) = (Moments::of(&known), noise_std * noise_std);
     if moments.mean_square() == 0.0 {
         return Err(Error::NotObservable("points that are infinitely far do not show a translation".into()));
     }

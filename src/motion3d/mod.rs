@@ -36,7 +36,7 @@
 //! let flow = Flow::Plane { points: &points, flow: &flow, camera: None };
 //! let options =
 //!     MotionOptions { method: Method::Efficient, placement: Placement::Start, ..MotionOptions::default() };
-//! let found = estimate_motion(&flow, &Noise::Sigma(1e-4), &options)?;
+//! let found = estimate_motion(&flow, &Noise::StandardDeviation(1e-4), &options)?;
 //! assert_eq!(found.status, Status::Ok);
 //! assert!(found.motion.angle_to(&truth) < 1e-3);
 //! # Ok(())

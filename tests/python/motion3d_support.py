@@ -17,9 +17,9 @@ __all__ = ["U", "W", "claims", "coverage", "fixed", "honesty", "layouts", "rival
 U, W = scenes.motion("oblique")
 
 
-def scene(n=300, sigma=0.01, seed=0, depth="uniform", name="oblique"):
-    return scenes.differential(depth, name, n, sigma, seed)
+def scene(n=300, noise_std=0.01, seed=0, depth="uniform", name="oblique"):
+    return scenes.differential(depth, name, n, noise_std, seed)
 
 
 def start(make, **options):
-    return motion3d.estimate_motion(make.points, make.flow, **{"sigma": make.sigma, "placement": "start", **options})
+    return motion3d.estimate_motion(make.points, make.flow, **{"noise_std": make.noise_std, "placement": "start", **options})

@@ -162,13 +162,13 @@ def row_offset():
 
 def moved(robust):
     scene = motion3d_scenes.differential("smooth", "oblique", 3000, 0.01, 0)
-    found = motion3d.estimate_motion(scene.points, scene.flow, sigma=scene.sigma, robust=robust)
+    found = motion3d.estimate_motion(scene.points, scene.flow, noise_std=scene.noise_std, robust=robust)
     return found.translation, found.rotation, found.inv_depth
 
 
 def bound():
     scene = motion3d_scenes.differential("smooth", "oblique", 3000, 0.01, 0)
-    return (motion3d.motion_bound(scene.points, scene.u, scene.w, scene.depths, sigma=scene.sigma).crlb,)
+    return (motion3d.motion_bound(scene.points, scene.u, scene.w, scene.depths, noise_std=scene.noise_std).crlb,)
 
 
 def moved_before_a_field(patches):

@@ -12,12 +12,12 @@ MISTAKES = [
     ({"flow": np.zeros((4, 2))}, "flow"),
     ({"K": np.eye(2)}, "K"),
     ({"K": np.zeros((3, 3))}, "K"),
-    ({"sigma": 0.0}, "sigma"),
-    ({"sigma": -1.0}, "sigma"),
-    ({"sigma": 1e-300}, "sigma"),
-    ({"sigma": 1e300}, "sigma"),
+    ({"noise_std": 0.0}, "noise_std"),
+    ({"noise_std": -1.0}, "noise_std"),
+    ({"noise_std": 1e-300}, "noise_std"),
+    ({"noise_std": 1e300}, "noise_std"),
     ({"cov": np.ones((5, 2))}, "cov"),
-    ({"sigma": 1.0, "cov": np.ones((5, 2, 2))}, "cov"),
+    ({"noise_std": 1.0, "cov": np.ones((5, 2, 2))}, "cov"),
     ({"method": "best"}, "method"),
     ({"placement": "end"}, "placement"),
     ({"projection": "cube"}, "projection"),
@@ -32,8 +32,8 @@ MISTAKES = [
     ({"rotation_prior": (np.zeros(3), np.eye(2))}, "rotation_prior"),
     ({"jacobian": np.zeros((5, 2, 2))}, "cov"),
     ({"jacobian": np.zeros((5, 2)), "cov": np.zeros((5, 6, 6))}, "jacobian"),
-    ({"jacobian": np.zeros((5, 2, 2)), "sigma": 1.0}, "sigma"),
-    ({"jacobian": np.zeros((5, 2, 2)), "sigma": 1.0, "cov": np.tile(np.eye(6), (5, 1, 1))}, "cov"),
+    ({"jacobian": np.zeros((5, 2, 2)), "noise_std": 1.0}, "noise_std"),
+    ({"jacobian": np.zeros((5, 2, 2)), "noise_std": 1.0, "cov": np.tile(np.eye(6), (5, 1, 1))}, "cov"),
     ({"jacobian": np.zeros((5, 2, 2)), "projection": "sphere", "cov": np.tile(np.eye(6), (5, 1, 1))}, "projection"),
     ({"weight_inv_depth": -np.ones(5)}, "weight_inv_depth"),
     ({"weight_inv_depth": np.zeros(5)}, "weight_inv_depth"),
@@ -50,9 +50,9 @@ def test_mistakes_are_refused_by_name(change, word):
 def test_arguments_of_another_kind_are_refused():
     with pytest.raises(TypeError, match=r"^points\b"):
         motion3d.estimate_motion([["a", "b"]], np.zeros((1, 2)))
-    with pytest.raises(TypeError, match=r"^sigma\b"):
-        motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), sigma="much")
-    for wrong in ({"robust": "no"}, {"robust": 1}, {"robust": None}, {"points_per_independent_sample": "2"}, {"points_per_independent_sample": None}, {"points_per_independent_sample": [1, 2]}, {"correlation_length": "1"}, {"correlation_length": None}, {"threads": "2"}, {"threads": True}, {"random_state": True}, {"sigma": "0.3"}, {"sigma": True}, {"random_state": 1.5}, {"threads": 2.0}, {"initial": 5}, {"rotation_prior": 3}):
+    with pytest.raises(TypeError, match=r"^noise_std\b"):
+        motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), noise_std="much")
+    for wrong in ({"robust": "no"}, {"robust": 1}, {"robust": None}, {"points_per_independent_sample": "2"}, {"points_per_independent_sample": None}, {"points_per_independent_sample": [1, 2]}, {"correlation_length": "1"}, {"correlation_length": None}, {"threads": "2"}, {"threads": True}, {"random_state": True}, {"noise_std": "0.3"}, {"noise_std": True}, {"random_state": 1.5}, {"threads": 2.0}, {"initial": 5}, {"rotation_prior": 3}):
         with pytest.raises(TypeError, match=f"^{next(iter(wrong))}: "):
             motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), **wrong)
     for name in ("method", "placement", "projection", "smoother"):
@@ -60,14 +60,14 @@ def test_arguments_of_another_kind_are_refused():
             motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), **{name: None})
     with pytest.raises(TypeError, match="^jacobian: "):
         motion3d.estimate_motion(np.zeros((5, 2)), np.zeros((5, 2)), jacobian=np.zeros((5, 2, 2), complex), cov=np.tile(np.eye(6), (5, 1, 1)))
-    for wrong in ({"threads": 2**70}, {"points_per_independent_sample": 0.5, "sigma": 1.0}, {"points_per_independent_sample": float("nan"), "sigma": 1.0}, {"correlation_length": float("inf")}, {"threads": -1}, {"random_state": -1}, {"points": [[1, 2], [3]]}, {"correlation_length": -1}, {"cov": -np.tile(np.eye(2), (5, 1, 1))}, {"cov": np.zeros((5, 2, 2))}, {"cov": np.tile([[1, 0.5], [0, 1]], (5, 1, 1))}, {"initial": ([0, 0, 0], W)}, {"K": [[-500, 0, 0], [0, -500, 0], [0, 0, 1]]}, {"K": [[500, 0, 0], [9, 500, 0], [0, 0, 1]]}):
+    for wrong in ({"threads": 2**70}, {"points_per_independent_sample": 0.5, "noise_std": 1.0}, {"points_per_independent_sample": float("nan"), "noise_std": 1.0}, {"correlation_length": float("inf")}, {"threads": -1}, {"random_state": -1}, {"points": [[1, 2], [3]]}, {"correlation_length": -1}, {"cov": -np.tile(np.eye(2), (5, 1, 1))}, {"cov": np.zeros((5, 2, 2))}, {"cov": np.tile([[1, 0.5], [0, 1]], (5, 1, 1))}, {"initial": ([0, 0, 0], W)}, {"K": [[-500, 0, 0], [0, -500, 0], [0, 0, 1]]}, {"K": [[500, 0, 0], [9, 500, 0], [0, 0, 1]]}):
         with pytest.raises(ValueError, match=f"^{next(iter(wrong))}: "):
             motion3d.estimate_motion(**{"points": np.zeros((5, 2)), "flow": np.zeros((5, 2)), **wrong})
     with pytest.raises(ValueError, match="^inv_depth: "):
-        motion3d.motion_bound(np.random.default_rng(1).random((6, 2)), U, W, np.full(6, np.nan), sigma=0.1)
+        motion3d.motion_bound(np.random.default_rng(1).random((6, 2)), U, W, np.full(6, np.nan), noise_std=0.1)
     with pytest.raises(jacoflow.NotObservableError):
-        motion3d.motion_bound(np.zeros((6, 2)), U, W, np.ones(6), sigma=0.1)
-    with pytest.raises(ValueError, match="^sigma"):
+        motion3d.motion_bound(np.zeros((6, 2)), U, W, np.ones(6), noise_std=0.1)
+    with pytest.raises(ValueError, match="^noise_std"):
         motion3d.motion_bound(np.zeros((6, 2)), U, W, np.ones(6))
 
 
@@ -80,21 +80,21 @@ SURFACES = np.tile([1.0, 0.1, 0.1], (6, 1))
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"sigma": 0.1, "jacobian": True, "inv_depth": SURFACES}, ["sigma: ", "cov (N, 6, 6)"]),
-        ({"sigma": 0.1, "cov": SIX, "jacobian": True, "inv_depth": SURFACES}, ["cov: ", "sigma", "both"]),
-        ({"sigma": 0.1, "cov": np.tile(np.eye(2), (6, 1, 1))}, ["cov: ", "sigma", "both"]),
+        ({"noise_std": 0.1, "jacobian": True, "inv_depth": SURFACES}, ["noise_std: ", "cov (N, 6, 6)"]),
+        ({"noise_std": 0.1, "cov": SIX, "jacobian": True, "inv_depth": SURFACES}, ["cov: ", "noise_std", "both"]),
+        ({"noise_std": 0.1, "cov": np.tile(np.eye(2), (6, 1, 1))}, ["cov: ", "noise_std", "both"]),
         ({"points": AROUND, "cov": SIX, "jacobian": True, "inv_depth": SURFACES, "projection": "sphere"}, ["projection: ", "jacobian", "sphere"]),
-        ({"sigma": 0.1, "points": np.empty((0, 2)), "inv_depth": np.empty(0)}, ["points: ", "5 points", "got 0"]),
-        ({"sigma": 0.1, "points": np.where(np.arange(6)[:, None] < 3, np.nan, PLACES)}, ["points: ", "finite", "got 3"]),
+        ({"noise_std": 0.1, "points": np.empty((0, 2)), "inv_depth": np.empty(0)}, ["points: ", "5 points", "got 0"]),
+        ({"noise_std": 0.1, "points": np.where(np.arange(6)[:, None] < 3, np.nan, PLACES)}, ["points: ", "finite", "got 3"]),
         ({"cov": np.full((6, 2, 2), np.nan)}, ["cov: ", "finite"]),
         ({"cov": SIX[:1], "points": PLACES[:1], "inv_depth": SURFACES[:1], "jacobian": True}, ["points: ", "2 points", "got 1"]),
-        ({"sigma": 0.1, "translation": [0, 0, 0]}, ["translation: ", "direction", "(0, 0, 0)"]),
-        ({"sigma": 0.1, "translation": [1e300, np.nan, 1]}, ["translation: ", "(1e300, NaN, 1)"]),
-        ({"sigma": 0.1, "rotation": [0, np.inf, 0]}, ["rotation: ", "(0, inf, 0)"]),
-        ({"sigma": 1e300}, ["sigma: ", "got 1e300"]),
+        ({"noise_std": 0.1, "translation": [0, 0, 0]}, ["translation: ", "direction", "(0, 0, 0)"]),
+        ({"noise_std": 0.1, "translation": [1e300, np.nan, 1]}, ["translation: ", "(1e300, NaN, 1)"]),
+        ({"noise_std": 0.1, "rotation": [0, np.inf, 0]}, ["rotation: ", "(0, inf, 0)"]),
+        ({"noise_std": 1e300}, ["noise_std: ", "got 1e300"]),
         ({"cov": np.tile([[-1e300, 0], [0, 1e-9]], (6, 1, 1))}, ["cov: ", "at point 0 (-1e300, 0, 0, 1e-9)"]),
-        ({"sigma": 0.1, "K": [[1e300, 0, 0], [0, -1e300, 0], [0, 0, 1]]}, ["K: ", "1e300 and -1e300"]),
-        ({"sigma": 0.1, "points": 3 * AROUND, "projection": "sphere"}, ["points: ", "length 1"]),
+        ({"noise_std": 0.1, "K": [[1e300, 0, 0], [0, -1e300, 0], [0, 0, 1]]}, ["K: ", "1e300 and -1e300"]),
+        ({"noise_std": 0.1, "points": 3 * AROUND, "projection": "sphere"}, ["points: ", "length 1"]),
     ],
 )
 def test_mistakes_of_a_bound_are_refused_by_name_in_short_words(change, words):
@@ -110,8 +110,8 @@ def test_mistakes_of_an_estimate_are_told_in_short_words():
     for change, word in (
         ({"rotation_prior": (np.zeros(3), -1e300 * np.eye(3))}, "-1e300"),
         ({"initial": (np.array([1e300, np.nan, 0]), np.zeros(3))}, "(1e300, NaN, 0) and (0, 0, 0)"),
-        ({"sigma": 1e-300}, "1e-300"),
-        ({"points_per_independent_sample": 1e-200, "sigma": 1.0}, "1e-200"),
+        ({"noise_std": 1e-300}, "1e-300"),
+        ({"points_per_independent_sample": 1e-200, "noise_std": 1.0}, "1e-200"),
     ):
         with pytest.raises(ValueError) as raised:
             motion3d.estimate_motion(PLACES, np.zeros((6, 2)), **change)
@@ -123,7 +123,7 @@ def test_mistakes_of_an_estimate_are_told_in_short_words():
 @pytest.mark.parametrize("wrong", [1, 0, "yes", None, np.array(True)])
 def test_switches_are_true_or_false(wrong):
     with pytest.raises(TypeError, match="^jacobian: "):
-        motion3d.motion_bound(PLACES, U, W, np.ones(6), sigma=0.1, jacobian=wrong)
+        motion3d.motion_bound(PLACES, U, W, np.ones(6), noise_std=0.1, jacobian=wrong)
     with pytest.raises(TypeError, match="^whole_frame: "):
         motion3d.predict_flow(PLACES, U, W, np.ones(6), whole_frame=wrong)
 

@@ -87,7 +87,7 @@ def test_options_that_a_field_does_not_have_are_refused_by_name():
     whole, _ = motion3d.estimate_field_motion(field, camera, robust=False)
     box = (20, 10, 60, 50)
     for wrong, words in (
-        ({"sigma": 0.1}, ["sigma: ", "covariances of its own", "0.1"]),
+        ({"noise_std": 0.1}, ["noise_std: ", "covariances of its own", "0.1"]),
         ({"cov": np.ones((3, 2, 2))}, ["cov: ", "covariances of its own"]),
         ({"jacobian": np.ones((3, 2, 2))}, ["jacobian: ", "patches"]),
         ({"projection": "sphere"}, ["projection: ", "sphere"]),

@@ -12,13 +12,13 @@ from jacoflow import motion3d
 WEIGHTS = ("shrunk", "ml", "ones")
 
 
-def flow(n=200, angle=2.2, sigma=0.3, seed=2):
+def flow(n=200, angle=2.2, noise_std=0.3, seed=2):
     nu = np.linspace(0.5, 1.5, n)
-    return nu, np.outer(nu, [np.cos(angle), np.sin(angle)]) + sigma * np.random.default_rng(seed).normal(size=(n, 2))
+    return nu, np.outer(nu, [np.cos(angle), np.sin(angle)]) + noise_std * np.random.default_rng(seed).normal(size=(n, 2))
 
 
 def test_published_figures():
-    bound = motion3d.lateral_bound(np.linspace(0.5, 1.5, 101), sigma=0.3)
+    bound = motion3d.lateral_bound(np.linspace(0.5, 1.5, 101), noise_std=0.3)
     got = (bound.ml_variance, bound.ones_variance, bound.crlb, bound.crossover)
     assert [float(f"{value:.4e}") for value in got] == [8.8940e-4, 8.9109e-4, 8.2128e-4, 3.0369e-1]
 
@@ -40,7 +40,7 @@ def test_variances_of_many_trials_are_those_of_theory():
 @pytest.mark.parametrize("weights", WEIGHTS)
 def test_estimates_are_what_they_say(weights):
     nu, seen = flow()
-    found = motion3d.estimate_lateral(seen, sigma=0.3, weights=weights)
+    found = motion3d.estimate_lateral(seen, noise_std=0.3, weights=weights)
     moments = seen.T @ seen
     written = {
         "ml": 0.5 * np.arctan2(2 * moments[0, 1], moments[0, 0] - moments[1, 1]),
@@ -49,14 +49,14 @@ def test_estimates_are_what_they_say(weights):
     if weights in written:
         off = found.angle - written[weights]
         assert abs(np.sin(off)) < 1e-12
-    assert abs(found.angle - 2.2) < 4 * np.sqrt(found.variance) and found.sigma == 0.3
+    assert abs(found.angle - 2.2) < 4 * np.sqrt(found.variance) and found.noise_std == 0.3
     assert found.variance >= found.crlb
     assert found.angle_std == pytest.approx(np.degrees(np.sqrt(found.variance)))
     assert_allclose(found.translation, [np.cos(found.angle), np.sin(found.angle), 0])
     assert_allclose(found.inv_depth, seen @ found.translation[:2])
     unknown = motion3d.estimate_lateral(seen, weights=weights)
-    assert unknown.sigma == pytest.approx(0.3, rel=0.15)
-    bound = motion3d.lateral_bound(nu, sigma=0.3)
+    assert unknown.noise_std == pytest.approx(0.3, rel=0.15)
+    bound = motion3d.lateral_bound(nu, noise_std=0.3)
     assert found.variance == pytest.approx({"shrunk": bound.shrunk_variance, "ml": bound.ml_variance, "ones": bound.ones_variance}[weights], rel=0.2)
 
 
@@ -65,8 +65,8 @@ def test_it_agrees_with_the_general_estimate():
     rng = np.random.default_rng(4)
     nu, seen = flow(400, 0.6, 0.02)
     rng.shuffle(seen)
-    general = motion3d.estimate_motion(rng.uniform(-0.6, 0.6, (400, 2)), seen, sigma=0.02, placement="start", rotation_prior=(np.zeros(3), 1e-12 * np.eye(3)), method="ml")
-    found = motion3d.estimate_lateral(seen, sigma=0.02, weights="ml")
+    general = motion3d.estimate_motion(rng.uniform(-0.6, 0.6, (400, 2)), seen, noise_std=0.02, placement="start", rotation_prior=(np.zeros(3), 1e-12 * np.eye(3)), method="ml")
+    found = motion3d.estimate_lateral(seen, noise_std=0.02, weights="ml")
     assert scores.angle(general.translation, found.translation) < 4 * general.direction_std < 2
     assert np.arctan2(general.translation[1], general.translation[0]) == pytest.approx(found.angle, abs=2 * np.sqrt(found.variance))
 
@@ -92,11 +92,11 @@ def test_arrays_of_any_kind():
         ({"flow": np.zeros((0, 2))}, "flow", ValueError),
         ({"flow": np.ones((1, 2))}, "flow", ValueError),
         ({"flow": [["a", "b"]]}, "flow", TypeError),
-        ({"sigma": 0.0}, "sigma", ValueError),
-        ({"sigma": -1.0}, "sigma", ValueError),
-        ({"sigma": float("nan")}, "sigma", ValueError),
-        ({"sigma": "0.3"}, "sigma", TypeError),
-        ({"sigma": True}, "sigma", TypeError),
+        ({"noise_std": 0.0}, "noise_std", ValueError),
+        ({"noise_std": -1.0}, "noise_std", ValueError),
+        ({"noise_std": float("nan")}, "noise_std", ValueError),
+        ({"noise_std": "0.3"}, "noise_std", TypeError),
+        ({"noise_std": True}, "noise_std", TypeError),
         ({"weights": "best"}, "weights", ValueError),
         ({"weights": None}, "weights", TypeError),
     ],
@@ -107,11 +107,11 @@ def test_mistakes_are_refused_by_name(change, word, kind):
 
 
 def test_bounds_refuse_by_name_too():
-    for wrong, word in (({"inv_depth": np.ones((3, 2))}, "inv_depth"), ({"inv_depth": [np.nan]}, "inv_depth"), ({"sigma": 0.0}, "sigma")):
+    for wrong, word in (({"inv_depth": np.ones((3, 2))}, "inv_depth"), ({"inv_depth": [np.nan]}, "inv_depth"), ({"noise_std": 0.0}, "noise_std")):
         with pytest.raises(ValueError, match=f"^{word}: "):
-            motion3d.lateral_bound(**{"inv_depth": np.ones(3), "sigma": 0.1, **wrong})
-    with pytest.raises(TypeError, match="^sigma: "):
-        motion3d.lateral_bound(np.ones(3), sigma="much")
-    for nothing in (lambda: motion3d.lateral_bound(np.zeros(3), sigma=0.1), lambda: motion3d.estimate_lateral(np.zeros((5, 2)))):
+            motion3d.lateral_bound(**{"inv_depth": np.ones(3), "noise_std": 0.1, **wrong})
+    with pytest.raises(TypeError, match="^noise_std: "):
+        motion3d.lateral_bound(np.ones(3), noise_std="much")
+    for nothing in (lambda: motion3d.lateral_bound(np.zeros(3), noise_std=0.1), lambda: motion3d.estimate_lateral(np.zeros((5, 2)))):
         with pytest.raises(jacoflow.NotObservableError):
             nothing()

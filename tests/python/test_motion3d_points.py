@@ -15,7 +15,7 @@ def test_intrinsics_with_skew_change_nothing_but_the_unit():
     camera = np.array([[500.0, 7.0, 310.0], [0.0, 420.0, 255.0], [0.0, 0.0, 1.0]])
     pixels = np.column_stack([make.points, np.ones(200)]) @ camera.T
     flow = make.flow @ camera[:2, :2].T
-    covariance = np.broadcast_to(make.sigma**2 * camera[:2, :2] @ camera[:2, :2].T, (200, 2, 2))
+    covariance = np.broadcast_to(make.noise_std**2 * camera[:2, :2] @ camera[:2, :2].T, (200, 2, 2))
     there = motion3d.estimate_motion(pixels[:, :2], flow, camera, cov=covariance, placement="start")
     here = start(make)
     assert_allclose(there.translation, here.translation, atol=1e-9)
@@ -42,9 +42,9 @@ def test_covariances_are_worth_their_while():
 def test_unknown_noise_is_estimated():
     make = scenes.two_views("uniform", "oblique", 0.3, 4, 5, outliers=0.4)
     found = motion3d.estimate_motion(make.points, make.flow, scenes.K, robust=True)
-    assert found.sigma == pytest.approx(0.3, rel=0.15)
+    assert found.noise_std == pytest.approx(0.3, rel=0.15)
     assert np.mean(found.inliers == make.inliers) > 0.97
-    assert motion3d.estimate_motion(make.points[make.inliers], make.flow[make.inliers], scenes.K).sigma == pytest.approx(0.3, rel=0.1)
+    assert motion3d.estimate_motion(make.points[make.inliers], make.flow[make.inliers], scenes.K).noise_std == pytest.approx(0.3, rel=0.1)
 
 
 @pytest.mark.parametrize("robust", [False, True])
@@ -53,11 +53,11 @@ def test_arrays_of_any_kind(robust):
     usual = start(make, robust=robust)
     wide = np.full((400, 4), np.nan)
     wide[::2, ::2] = make.points
-    strided = motion3d.estimate_motion(wide[::2, ::2], np.asfortranarray(make.flow), sigma=0.01, placement="start", robust=robust)
+    strided = motion3d.estimate_motion(wide[::2, ::2], np.asfortranarray(make.flow), noise_std=0.01, placement="start", robust=robust)
     assert_array_equal(strided.translation, usual.translation)
-    lists = motion3d.estimate_motion(make.points.tolist(), make.flow.tolist(), sigma=0.01, placement="start", robust=robust)
+    lists = motion3d.estimate_motion(make.points.tolist(), make.flow.tolist(), noise_std=0.01, placement="start", robust=robust)
     assert_array_equal(lists.inv_depth, usual.inv_depth)
-    single = motion3d.estimate_motion(make.points.astype("f4"), make.flow.astype("f4"), sigma=0.01, placement="start", robust=robust)
+    single = motion3d.estimate_motion(make.points.astype("f4"), make.flow.astype("f4"), noise_std=0.01, placement="start", robust=robust)
     assert_allclose(single.translation, usual.translation, atol=1e-3)
     again = start(make, robust=robust, threads=1)
     assert_array_equal(again.covariance, start(make, robust=robust, threads=3).covariance)
@@ -77,7 +77,7 @@ def test_results_pickle_and_tell_the_camera():
 
 def test_time_to_contact_and_focus():
     make = scene(800, 0.003, 2, "smooth", "forward")
-    turned = start(scenes.Scene(make.points, make.flow, make.depths, make.u, make.w, make.sigma))
+    turned = start(scenes.Scene(make.points, make.flow, make.depths, make.u, make.w, make.noise_std))
     truth = -1 / (make.depths * make.u[2])
     contact, deviation = motion3d.time_to_contact(turned), motion3d.time_to_contact_std(turned)
     assert np.median(np.abs(contact - truth) / deviation) < 1.2
@@ -102,7 +102,7 @@ def test_depths_of_any_unit_leave_the_time_to_contact_alone():
 
 
 def test_the_focus_is_nowhere_in_sideways_motion():
-    found = start(scene(sigma=1e-7, name="lateral"), method="ml")
+    found = start(scene(noise_std=1e-7, name="lateral"), method="ml")
     sideways = motion3d.MotionEstimate(**{**vars(found), "translation": np.array([1.0, 0.0, 0.0])})
     assert motion3d.focus_of_expansion(sideways) is None
 
@@ -114,14 +114,14 @@ def test_degenerate_scenes_have_their_status():
     assert motion3d.estimate_motion(np.empty((0, 2)), np.empty((0, 2))).status == "too_few_points"
     rng = np.random.default_rng(0)
     _, r = scenes.rows(make.points)
-    turning = motion3d.estimate_motion(make.points, r @ W + rng.normal(0, 0.01, (300, 2)), sigma=0.01, placement="start")
+    turning = motion3d.estimate_motion(make.points, r @ W + rng.normal(0, 0.01, (300, 2)), noise_std=0.01, placement="start")
     assert turning.status == "rotation_only" and np.isnan(turning.translation).all()
     assert_array_equal(turning.inv_depth, 0)
     assert np.isinf(turning.time_to_contact).all()
     assert_allclose(turning.rotation, W, atol=4 * turning.rotation_std.max())
     plane = 0.9 + 0.3 * make.points[:, 0] - 0.2 * make.points[:, 1]
     g, _ = scenes.rows(make.points)
-    flat = motion3d.estimate_motion(make.points, plane[:, None] * (g @ U) + r @ W + rng.normal(0, 0.005, (300, 2)), sigma=0.005, placement="start")
+    flat = motion3d.estimate_motion(make.points, plane[:, None] * (g @ U) + r @ W + rng.normal(0, 0.005, (300, 2)), noise_std=0.005, placement="start")
     assert flat.status == "ambiguous" and len(flat.alternatives) >= 1
     both = [flat.translation, flat.alternatives[0].translation]
     normal = np.array([0.3, -0.2, 0.9]) / np.linalg.norm([0.3, -0.2, 0.9])
@@ -137,17 +137,17 @@ def test_the_sphere_is_a_screen_like_the_plane():
     outliers = rng.uniform(size=500) < 0.3
     flow = np.where(outliers[:, None], along(rng.uniform(-4, 4, (500, 3)), make.points), make.flow)
     flow[7] = np.nan
-    found = motion3d.estimate_motion(make.points, flow, sigma=0.1, projection="sphere", robust=True)
+    found = motion3d.estimate_motion(make.points, flow, noise_std=0.1, projection="sphere", robust=True)
     assert found.status == "ok" and scores.angle(found.translation, U) < 4 * found.direction_std < 8
     assert np.mean(found.inliers == ~outliers) > 0.97 and np.isnan(found.inv_depth[7])
     eta = make.points[make.points[:, 2] > 0.75]
     noise = along(0.003 * rng.normal(size=eta.shape), eta)
     turning = np.cross(eta, np.cross(np.cross(W, eta), eta))
-    still = motion3d.estimate_motion(eta, turning + noise, sigma=0.003, projection="sphere")
+    still = motion3d.estimate_motion(eta, turning + noise, noise_std=0.003, projection="sphere")
     assert still.status == "rotation_only" and scores.angle(still.rotation, W) < 5
     normal = np.array([0.3, -0.2, 0.9])
     plane = turning + np.cross(eta, (eta @ normal)[:, None] * np.cross(U, eta)) + noise
-    flat = motion3d.estimate_motion(eta, plane, sigma=0.003, projection="sphere")
+    flat = motion3d.estimate_motion(eta, plane, noise_std=0.003, projection="sphere")
     both = [flat.translation, *(other.translation for other in flat.alternatives)]
     assert flat.status == "ambiguous"
     for truth in (U, normal):
@@ -156,7 +156,7 @@ def test_the_sphere_is_a_screen_like_the_plane():
 
 def test_a_variance_of_nothing_does_not_decide_alone():
     make = scene(300, 0.01, 4)
-    covariance = np.tile(make.sigma**2 * np.eye(2), (300, 1, 1))
+    covariance = np.tile(make.noise_std**2 * np.eye(2), (300, 1, 1))
     usual = motion3d.estimate_motion(make.points, make.flow, cov=covariance, placement="start")
     for robust in (False, True):
         covariance[17] = 1e-20 * np.eye(2)
@@ -207,7 +207,7 @@ def test_what_is_said_of_scenes_by_chance_holds(robust):
 def test_times_on_the_sphere_times_the_bearings_z_reach_the_camera_plane():
     """Of each point, by going along with the motion until its depth is 0."""
     make = scenes.sphere("oblique", 400, 0.002, 5)
-    found = motion3d.estimate_motion(make.points, make.flow, sigma=0.002, projection="sphere")
+    found = motion3d.estimate_motion(make.points, make.flow, noise_std=0.002, projection="sphere")
     places = make.points / make.depths[:, None]
     truth = -places[:, 2] / make.u[2]
     times, deviations = (values * make.points[:, 2] for values in (found.time_to_contact, found.time_to_contact_std))

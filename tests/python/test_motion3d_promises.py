@@ -12,7 +12,7 @@ from jacoflow import motion3d
 @pytest.mark.parametrize(("n", "used"), [(29, "ml"), (30, "efficient")])
 def test_auto_smooths_depths_from_thirty_points_on(n, used):
     make = scenes.differential("uniform", "oblique", n, 0.003, 2)
-    run = lambda **options: motion3d.estimate_motion(make.points, make.flow, sigma=0.003, placement="start", **options)
+    run = lambda **options: motion3d.estimate_motion(make.points, make.flow, noise_std=0.003, placement="start", **options)
     found, named = run(), run(method=used)
     assert found.method_used == used and run(method="auto").method_used == used
     np.testing.assert_array_equal(found.translation, named.translation)
@@ -22,7 +22,7 @@ def test_auto_smooths_depths_from_thirty_points_on(n, used):
 def with_direction(u):
     """A result whose direction is `u` to the last digit."""
     make = scenes.differential("uniform", "lateral", 60, 1e-6, 1)
-    found = motion3d.estimate_motion(make.points, make.flow, sigma=1e-6, placement="start")
+    found = motion3d.estimate_motion(make.points, make.flow, noise_std=1e-6, placement="start")
     return motion3d.MotionEstimate(**{**vars(found), "translation": np.array(u)})
 
 
@@ -37,7 +37,7 @@ def test_the_focus_is_nowhere_below_a_billionth(u_z, there):
 def test_a_motion_along_the_picture_never_arrives():
     """The same flow everywhere, from the motion that explains it exactly: `u_z = 0` to the last digit."""
     points = scenes.differential("uniform", "lateral", 200, 0.0, 3).points
-    found = motion3d.estimate_motion(points, np.tile([0.25, 0.0], (200, 1)), sigma=0.01, placement="start", initial=([1.0, 0.0, 0.0], [0.0, 0.0, 0.0]))
+    found = motion3d.estimate_motion(points, np.tile([0.25, 0.0], (200, 1)), noise_std=0.01, placement="start", initial=([1.0, 0.0, 0.0], [0.0, 0.0, 0.0]))
     assert found.status == "ok" and found.translation[2] == 0
     assert np.isposinf(motion3d.time_to_contact(found)).all() and np.isposinf(motion3d.time_to_contact_std(found)).all()
     assert motion3d.focus_of_expansion(found) is None
@@ -58,7 +58,7 @@ def test_python_goes_on_while_a_motion_is_estimated(robust):
     thread.start()
     begun.wait()
     before = counts[0]
-    motion3d.estimate_motion(make.points, make.flow, sigma=0.1, placement="start", robust=robust)
+    motion3d.estimate_motion(make.points, make.flow, noise_std=0.1, placement="start", robust=robust)
     within = counts[0] - before
     done.set()
     thread.join()

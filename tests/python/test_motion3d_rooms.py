@@ -71,7 +71,7 @@ def test_a_displacement_that_all_flow_has_in_common_is_in_the_covariance(six):
         jacobian = np.stack([(steps[1] - flow) / 1e-3, (steps[2] - flow) / 1e-3], axis=-1)
         given |= {"jacobian": jacobian, "cov": np.diag([0.01**2] * 2 + [0.0003**2] * 4) + np.zeros((n, 1, 1))}
     else:
-        given |= {"sigma": 0.01}
+        given |= {"noise_std": 0.01}
     found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, flow_bias_std=offset, **given) for offset in (0.02, 0.0))
     moved = []
     for step in 1e-4 * np.eye(2):
@@ -92,7 +92,7 @@ def test_what_all_flow_has_in_common_is_in_a_rotation_alone_too():
     """What it adds is what rotations of flow that is moved by it, or longer, are off."""
     pixels, _ = scene()
     flow = motion3d.predict_flow(pixels, [1.0, 0.0, 0.0], [0.01, -0.01, 0.005], np.zeros(400), rooms.K)
-    given = {"sigma": 0.01, "placement": "start"}
+    given = {"noise_std": 0.01, "placement": "start"}
     found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, **common, **given) for common in ({"flow_bias_std": 0.02, "flow_scale_std": 0.1}, {}))
     assert found.status == bare.status == "rotation_only"
     moved = [motion3d.estimate_motion(pixels, flow + step, rooms.K, **given).rotation - bare.rotation for step in 0.02 * np.eye(2)]
@@ -111,7 +111,7 @@ def test_what_all_flow_has_in_common_is_in_a_rotation_alone_too():
 def test_a_rotation_known_beforehand_counts_once_beside_a_displacement_of_all_flow():
     pixels, flow = scene()
     prior = (np.array([0.01, -0.01, 0.005]), 1e-7 * np.eye(3))
-    given = {"sigma": 0.05, "placement": "start", "method": "ml", "rotation_prior": prior}
+    given = {"noise_std": 0.05, "placement": "start", "method": "ml", "rotation_prior": prior}
     found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, flow_bias_std=offset, **given) for offset in (0.3, 0.0))
     moved = [motion3d.estimate_motion(pixels, flow + step, rooms.K, initial=(bare.translation, bare.rotation), **given).rotation - bare.rotation for step in 0.01 * np.eye(2)]
     added = np.sqrt(np.trace((found.covariance - bare.covariance)[2:, 2:]))
@@ -121,7 +121,7 @@ def test_a_rotation_known_beforehand_counts_once_beside_a_displacement_of_all_fl
 def test_times_to_contact_scale_with_the_flow():
     """A tenth more flow is a tenth more of every rate, and nothing else."""
     pixels, flow = scene()
-    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, sigma=0.05, flow_scale_std=scale) for scale in (0.1, 0.0))
+    found, bare = (motion3d.estimate_motion(pixels, flow, rooms.K, noise_std=0.05, flow_scale_std=scale) for scale in (0.1, 0.0))
     share = np.sqrt(found.time_to_contact_std**2 - bare.time_to_contact_std**2) / np.abs(found.time_to_contact)
     np.testing.assert_allclose(share, 0.1, rtol=1e-3)
 
@@ -138,7 +138,7 @@ def test_noise_among_outliers_that_is_larger_than_told_widens_the_covariance():
     rng = np.random.default_rng(9)
     flow = flow + 0.1 * rng.normal(size=flow.shape)
     flow[:80] = rng.uniform(-20, 20, (80, 2))
-    told, half = (motion3d.estimate_motion(pixels, flow, rooms.K, sigma=sigma, robust=True) for sigma in (0.1, 0.05))
+    told, half = (motion3d.estimate_motion(pixels, flow, rooms.K, noise_std=noise_std, robust=True) for noise_std in (0.1, 0.05))
     assert told.status == half.status == "ok"
     assert 0.75 < half.direction_std / told.direction_std < 1.5
 

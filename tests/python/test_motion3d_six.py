@@ -36,9 +36,9 @@ def test_two_exact_patches_are_enough():
 @pytest.mark.parametrize("case", range(5))
 def test_six_numbers_on_layouts_with_the_published_bounds(case):
     """Shrunk slants and flow alone within a fifth of the published figures; six numbers worse without shrinking where patches are small. Of ten patches the published errors of flow lie below their bound: a quarter."""
-    h, n, radius, sigma, asked = six.SIX[case]
-    like, _ = six.like_the_published(h, n, radius, sigma, asked)
-    row = six.six_row([scenes.patches("oblique", n, radius, sigma, like[t % len(like)], h, t) for t in range(240)], asked)
+    h, n, radius, noise_std, asked = six.SIX[case]
+    like, _ = six.like_the_published(h, n, radius, noise_std, asked)
+    row = six.six_row([scenes.patches("oblique", n, radius, noise_std, like[t % len(like)], h, t) for t in range(240)], asked)
     for name in ("CRLB flow", "CRLB six"):
         assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.03), row
     for name in ("flow ML", "flow prior", "six ML", "six shrunk"):

@@ -14,11 +14,11 @@ from jacoflow import motion3d
 @pytest.mark.parametrize("case", range(len(scores.PRACTICAL)))
 def test_no_scene_pays_for_smoothed_weights(case):
     """Every row of the table of scenes: both columns within a fifth of the published, and smoothed weights never more than 3 % above maximum likelihood on the same noise."""
-    depth, name, n, sigma, h, asked = scores.PRACTICAL[case]
+    depth, name, n, noise_std, h, asked = scores.PRACTICAL[case]
     plain, smoothed = [], []
     for seed in range(60 if n == 5000 else 150):
-        make = scenes.differential(depth, name, n, sigma, seed, h)
-        found = motion3d.estimate_motion(make.points, make.flow, sigma=sigma, placement="start", method="efficient")
+        make = scenes.differential(depth, name, n, noise_std, seed, h)
+        found = motion3d.estimate_motion(make.points, make.flow, noise_std=noise_std, placement="start", method="efficient")
         plain.append(scores.angle(found.ml.translation, make.u))
         smoothed.append(scores.angle(found.translation, make.u))
     assert scores.rms(smoothed) <= 1.03 * scores.rms(plain)
@@ -50,11 +50,11 @@ def test_distances_are_those_of_theory(case, monkeypatch):
 
 def errors_in_pixels(case, trials):
     """Errors of maximum likelihood and of smoothed weights, deg, and the published medians and rms of both."""
-    depth, name, sigma, median, disturbed, asked = scores.PIXELS[case]
+    depth, name, noise_std, median, disturbed, asked = scores.PIXELS[case]
     plain, smoothed = [], []
     for seed in range(trials):
-        make = scenes.two_views(depth, name, sigma, median, seed, **disturbed)
-        found = motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=sigma, robust=bool(disturbed), method="efficient")
+        make = scenes.two_views(depth, name, noise_std, median, seed, **disturbed)
+        found = motion3d.estimate_motion(make.points, make.flow, scenes.K, noise_std=noise_std, robust=bool(disturbed), method="efficient")
         plain.append(scores.angle(found.ml.translation, make.u))
         smoothed.append(scores.angle(found.translation, make.u))
     figures = [tuple(float(part) for part in text.split(" / ")) for text in asked[:2]]
@@ -80,12 +80,12 @@ def test_maximum_likelihood_over_the_smooth_scene_seen_sideways_is_published_bel
     """Two views, .5 px, 2 px: it is as large as (17) says, at the best of its minima too; the rms that is published lies within what 24 trials in a row differ by."""
     case = 2
     errors, smoothed, figures = errors_in_pixels(case, 240)
-    depth, name, sigma, median, _, _ = scores.PIXELS[case]
+    depth, name, noise_std, median, _, _ = scores.PIXELS[case]
     nearest, predicted = [], []
     for seed in range(240):
-        make = scenes.two_views(depth, name, sigma, median, seed)
-        nearest.append(scores.angle(motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=sigma, method="ml", initial=(make.u, make.w)).translation, make.u))
-        predicted.append(motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, sigma=sigma).direction_std[1])
+        make = scenes.two_views(depth, name, noise_std, median, seed)
+        nearest.append(scores.angle(motion3d.estimate_motion(make.points, make.flow, scenes.K, noise_std=noise_std, method="ml", initial=(make.u, make.w)).translation, make.u))
+        predicted.append(motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, noise_std=noise_std).direction_std[1])
     assert figures[0][1] < 0.85 * scores.rms(predicted)
     assert scores.rms(errors) == pytest.approx(scores.rms(predicted), rel=0.15)
     assert scores.rms(errors) < 1.03 * scores.rms(nearest)

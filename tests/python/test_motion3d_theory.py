@@ -25,7 +25,7 @@ def test_the_bound_is_that_of_a_plain_computation():
     t = g @ U
     s = np.linalg.norm(t, axis=1)
     p = np.stack([t[:, 1], -t[:, 0]], 1) / s[:, None]
-    bound = motion3d.motion_bound(make.points, U, W, make.depths, sigma=0.1)
+    bound = motion3d.motion_bound(make.points, U, W, make.depths, noise_std=0.1)
     along = np.einsum("ni,nij,aj->na", p, g, bound.tangent)
     d = np.concatenate([make.depths[:, None] * along, np.einsum("ni,nij->nj", p, r)], 1)
     m, noise = d.T @ d, np.zeros((5, 5))
@@ -63,10 +63,10 @@ def test_section_five_is_met():
 @pytest.mark.parametrize("case", [2, 3, 5, 6, 7, 8])
 def test_smoothed_weights_are_worth_their_while(case):
     """1.3 times below maximum likelihood on the same noise, within a fifth of the published figure, and honest."""
-    depth, name, n, sigma, h, asked = scores.PRACTICAL[case]
+    depth, name, n, noise_std, h, asked = scores.PRACTICAL[case]
     errors, plain, inside = [], [], []
     for seed in range(300):
-        make = scenes.differential(depth, name, n, sigma, seed, h)
+        make = scenes.differential(depth, name, n, noise_std, seed, h)
         found = start(make)
         errors.append(scores.angle(found.translation, make.u))
         plain.append(scores.angle(found.ml.translation, make.u))
@@ -79,15 +79,15 @@ def test_smoothed_weights_are_worth_their_while(case):
 @pytest.mark.parametrize("case", [7, 8])
 def test_maximum_likelihood_over_noisy_ground(case):
     """By name: direction and rotation within a fifth of the published figures, far above the bound that the depths' noise keeps it from; it tells so of itself, with the epipole beside the points and among them."""
-    depth, name, n, sigma, h, asked = scores.PRACTICAL[case]
+    depth, name, n, noise_std, h, asked = scores.PRACTICAL[case]
     errors, turns, bounds, inside = [], [], [], []
     for seed in range(150):
-        make = scenes.differential(depth, name, n, sigma, seed, h)
+        make = scenes.differential(depth, name, n, noise_std, seed, h)
         found = start(make, method="ml")
         assert found.method_used == "ml"
         errors.append(scores.angle(found.translation, make.u))
         turns.append(1e3 * np.linalg.norm(found.rotation - make.w))
-        bounds.append(motion3d.motion_bound(make.points, make.u, make.w, make.depths, sigma=sigma).direction_std[0])
+        bounds.append(motion3d.motion_bound(make.points, make.u, make.w, make.depths, noise_std=noise_std).direction_std[0])
         inside.append(scores.squared(scores.error(make, found.translation, found.rotation, found.tangent), found.covariance) < 11.070)
     assert scores.rms(errors) == pytest.approx(asked[0], rel=0.2)
     assert scores.rms(turns) == pytest.approx(asked[7], rel=0.2)
@@ -101,10 +101,10 @@ def test_ground_seen_obliquely_is_published_below_its_bound():
     errors, ideal, bounds = [], [], []
     for seed in range(240):
         make = scenes.two_views("ground", "oblique", 0.5, 2, seed)
-        run = lambda make=make, **options: motion3d.estimate_motion(make.points, make.flow, scenes.K, sigma=0.5, method="efficient", **options)
+        run = lambda make=make, **options: motion3d.estimate_motion(make.points, make.flow, scenes.K, noise_std=0.5, method="efficient", **options)
         errors.append(scores.angle(run().translation, make.u))
         ideal.append(scores.angle(run(initial=(make.u, make.w), weight_inv_depth=make.depths).translation, make.u))
-        bounds.append(motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, sigma=0.5).direction_std[0])
+        bounds.append(motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, noise_std=0.5).direction_std[0])
     published = float(case[5][1].split(" / ")[1])
     assert published < scores.rms(bounds) < scores.rms(errors) < 1.2 * scores.rms(bounds)
     assert scores.rms(errors) < 1.06 * scores.rms(ideal)
@@ -134,5 +134,5 @@ def test_noise_is_found_among_outliers(share):
     found = []
     for seed in range(30):
         make = scenes.two_views("uniform", "oblique", 0.3, 4, seed, outliers=share)
-        found.append(motion3d.estimate_motion(make.points, make.flow, scenes.K, robust=True, method="ml").sigma)
+        found.append(motion3d.estimate_motion(make.points, make.flow, scenes.K, robust=True, method="ml").noise_std)
     assert 0.285 < np.mean(found) < 0.315 and 0.26 < min(found) and max(found) < 0.345, found

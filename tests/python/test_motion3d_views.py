@@ -46,7 +46,7 @@ def test_displacements_over_a_whole_frame_are_placed_half_way():
         assert row["exact, deg"] < 1e-6 and row["exact, mrad"] < 1e-6, row
 
 
-@pytest.mark.parametrize("options", [{}, {"method": "ml"}, {"sigma": 1e-6}, {"robust": True}, {"robust": True, "sigma": 1e-6}])
+@pytest.mark.parametrize("options", [{}, {"method": "ml"}, {"noise_std": 1e-6}, {"robust": True}, {"robust": True, "noise_std": 1e-6}])
 def test_two_exact_views_give_the_exact_motion(options):
     """However fast they turn; the depths are those half way, and predict the displacement."""
     for ratio, turn in ((0.02, 0.02), (0.02, 0.3), (0.2, 0.1), (0.2, 0.3)):
@@ -92,6 +92,6 @@ def test_a_camera_that_only_turns_fast_is_told(noise):
             flow = scenes.displaced(pixels, np.zeros(300), U, turn * axis) - pixels + rng.normal(0, 0.05, (300, 2))
             if robust:
                 flow = np.where(rng.uniform(size=(300, 1)) < 0.3, rng.uniform(-90, 90, (300, 2)), flow)
-            found = motion3d.estimate_motion(pixels, flow, scenes.K, sigma=noise, robust=robust)
+            found = motion3d.estimate_motion(pixels, flow, scenes.K, noise_std=noise, robust=robust)
             assert found.status == "rotation_only", (turn, robust)
             assert np.abs(found.rotation - turn * axis).max() < 5 * found.rotation_std.max()

@@ -10,7 +10,7 @@ Estimation from Noisy Optical Flow" (equation numbers below), and smoothed weigh
 >>> points, depths = rng.uniform(-0.6, 0.6, (300, 2)), rng.uniform(0.5, 1.5, 300)
 >>> u, w = np.array([0.6, 0.2, 0.75]), np.array([0.02, -0.03, 0.01])
 >>> flow = motion3d.predict_flow(points, u, w, depths) + rng.normal(0, 0.005, (300, 2))
->>> found = motion3d.estimate_motion(points, flow, sigma=0.005, placement="start")
+>>> found = motion3d.estimate_motion(points, flow, noise_std=0.005, placement="start")
 >>> found.status, float(np.degrees(np.arccos(found.translation @ u / np.linalg.norm(u)))) < 1
 ('ok', True)
 """

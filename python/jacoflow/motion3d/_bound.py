@@ -34,7 +34,7 @@ def motion_bound(
     inv_depth: ArrayLike,
     K: ArrayLike | None = None,
     *,
-    sigma: float | None = None,
+    noise_std: float | None = None,
     cov: ArrayLike | None = None,
     jacobian: bool = False,
     projection: Literal["plane", "sphere"] = "plane",
@@ -51,10 +51,10 @@ def motion_bound(
         True inverse depths.
     K : array (3, 3) or None
         Camera matrix, px.
-    sigma : float, units of flow
+    noise_std : float, units of flow
         Standard deviation of each component of the flow; not with `jacobian`.
     cov : array (N, 2, 2), (N, 3, 3) on the sphere, or (N, 6, 6) with `jacobian`
-        Covariances instead of `sigma`, units of flow squared.
+        Covariances instead of `noise_std`, units of flow squared.
     jacobian : bool
         Whether six numbers would be measured a patch.
     projection : "plane" or "sphere"
@@ -67,5 +67,5 @@ def motion_bound(
     NotObservableError
         When the points do not determine the motion, as points at one place.
     """
-    given = layout(K, sigma, cov, projection, switch("jacobian", jacobian))
+    given = layout(K, noise_std, cov, projection, switch("jacobian", jacobian))
     return MotionBound(**_motion3d_bound(points, inv_depth, translation, rotation, given))

@@ -44,7 +44,7 @@ def number(name: str, value: float) -> float:
     raise TypeError(f"{name}: expected a number, got {value!r}")
 
 
-def besides(usual: float, value: float) -> float | None:
+def unless_default(usual: float, value: float) -> float | None:
     """None for the usual value, which needs nothing of the other options."""
     return None if value == usual else value
 
@@ -72,17 +72,17 @@ def switch(name: str, value: bool) -> bool:
     return bool(value)
 
 
-def layout(K: ArrayLike | None, sigma: float | None, cov: ArrayLike | None, projection: str, six: bool) -> dict[str, Any]:
+def layout(K: ArrayLike | None, noise_std: float | None, cov: ArrayLike | None, projection: str, six: bool) -> dict[str, Any]:
     """How points are given, as the compiled module takes it; `six`: with Jacobians, so that each has six numbers."""
     word("projection", projection)
-    deviation = None if sigma is None else number("sigma", sigma)
+    deviation = None if noise_std is None else number("noise_std", noise_std)
     if deviation is not None and cov is not None:
-        raise ValueError("cov: expected either sigma or cov, got both")
+        raise ValueError("cov: expected either noise_std or cov, got both")
     if six and projection == "sphere":
         raise ValueError('projection: expected "plane" with a jacobian, whose six numbers a patch are those of the plane, got "sphere"')
     if six and deviation is not None:
-        raise ValueError("sigma: expected None with a jacobian, for which cov (N, 6, 6) is needed, got a number")
-    return {"K": K, "sigma": deviation, "cov": cov, "projection": projection, "six": six}
+        raise ValueError("noise_std: expected None with a jacobian, for which cov (N, 6, 6) is needed, got a number")
+    return {"K": K, "noise_std": deviation, "cov": cov, "projection": projection, "six": six}
 
 
 def six(flow: ArrayLike, jacobian: ArrayLike) -> Array:

@@ -7,7 +7,7 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 from .._jacoflow import _motion3d_estimate
-from ._checks import besides, count, layout, number, pair, six, switch, whole, word
+from ._checks import unless_default, count, layout, number, pair, six, switch, whole, word
 from ._results import MotionEstimate, estimate_of
 
 
@@ -16,7 +16,7 @@ def estimate_motion(
     flow: ArrayLike,
     K: ArrayLike | None = None,
     *,
-    sigma: float | None = None,
+    noise_std: float | None = None,
     cov: ArrayLike | None = None,
     jacobian: ArrayLike | None = None,
     projection: Literal["plane", "sphere"] = "plane",
@@ -47,7 +47,7 @@ def estimate_motion(
         Displacement over one frame.
     K : array (3, 3) or None
         Camera matrix, px; skew and unequal focal lengths are used.
-    sigma : float, units of flow
+    noise_std : float, units of flow
         Standard deviation of each component. None, and no `cov`: estimated from the residuals.
     cov : array (N, 2, 2), units of flow squared; (N, 3, 3) on the sphere; (N, 6, 6) with `jacobian`
         Covariance of each point's flow, in the order (u, v, u_x, v_x, u_y, v_y). A point with a variance below a millionth of the lower quartile of all has that quartile added, as no measurement is so much better than the others.
@@ -58,7 +58,7 @@ def estimate_motion(
     method : "auto", "ml" or "efficient"
         "auto": "efficient" from 30 points (5 patches) on, else "ml".
     robust : bool
-        Find the inliers of one motion among up to 60 % outliers. Where residuals of inliers look like those of an object with another motion (residuals of neighbours have one sign, or those of a part of the picture pull another way) and two motions explain them better, the status is "ambiguous"; that is not tested with `points_per_independent_sample` or `correlation_length`, as errors that go together look like that everywhere. Noise of these points that is larger than told widens the covariance. Without `sigma` or `cov` and below 100 points, outliers are believed in only if they explain more than larger noise would; where that is not sure the status is "few_points". A mover whose border cannot be told makes it "ambiguous".
+        Find the inliers of one motion among up to 60 % outliers. Where residuals of inliers look like those of an object with another motion (residuals of neighbours have one sign, or those of a part of the picture pull another way) and two motions explain them better, the status is "ambiguous"; that is not tested with `points_per_independent_sample` or `correlation_length`, as errors that go together look like that everywhere. Noise of these points that is larger than given widens the covariance. Without `noise_std` or `cov` and below 100 points, outliers are believed in only if they explain more than larger noise would; where that is not sure the status is "few_points". A mover whose border is not determined makes it "ambiguous".
     placement : "midpoint" or "start"
         What flow is. "midpoint": a displacement over one frame of a steady motion, from `points` to `points + flow`; its rotation is taken out of both ends, half from each, so that `translation` and `rotation` are exact however fast the camera turns (`X_2 = exp([w]x) X_1 + V(w) u`; noise-free views are recovered to rounding), and inverse depths are those half way in time. Where that is
         negligible beside the noise the displacement is placed half way, exact to second order. "start": instantaneous flow at `points`. Bearings and their flow are taken as given.
@@ -71,7 +71,7 @@ def estimate_motion(
     initial : (translation (3,), rotation (3,) in rad/frame)
         Look for the minimum near this motion instead of everywhere.
     points_per_independent_sample : float, no unit
-        Number of given points per statistically independent one, as in a dense field: `cov` (or `sigma` squared) is so many times their own, so that together they count once. What is an outlier, and whether chance explains a rotation alone, is judged by their own. At least 1.
+        Number of given points per statistically independent one, as in a dense field: `cov` (or `noise_std` squared) is so many times their own, so that together they count once. What is an outlier, and whether chance explains a rotation alone, is judged by their own. At least 1.
     correlation_length : float, px with K, else units of points; rad on the sphere
         How far errors of neighbours go together, as those of windowed flow do (a field has its own): at the distance d and with this length l their correlation is taken to be `0.4 exp(-d^2 / 4 l^2) + 0.6 exp(-d / 3.75 l)`. It widens the covariance and leaves the motion alone. Where residuals of neighbours are more alike than that, `l` is taken to be longer, up to four times, and where they are larger than the noise of a point, as much larger. 0: errors are independent.
     flow_scale_std : float, no unit, from 0 to 1
@@ -90,10 +90,10 @@ def estimate_motion(
     """
     for name, value in (("method", method), ("placement", placement), ("smoother", smoother)):
         word(name, value)
-    given = layout(K, sigma, cov, projection, jacobian is not None)
+    given = layout(K, noise_std, cov, projection, jacobian is not None)
     options = {
         "method": method, "robust": switch("robust", robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
-        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "points_per_independent_sample": besides(1, number("points_per_independent_sample", points_per_independent_sample)), "correlation_length": besides(0, number("correlation_length", correlation_length)), "flow_scale_std": number("flow_scale_std", flow_scale_std), "flow_bias_std": number("flow_bias_std", flow_bias_std), "random_state": whole("random_state", random_state), "threads": None if threads is None else count("threads", threads),
+        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "points_per_independent_sample": unless_default(1, number("points_per_independent_sample", points_per_independent_sample)), "correlation_length": unless_default(0, number("correlation_length", correlation_length)), "flow_scale_std": number("flow_scale_std", flow_scale_std), "flow_bias_std": number("flow_bias_std", flow_bias_std), "random_state": whole("random_state", random_state), "threads": None if threads is None else count("threads", threads),
     }  # fmt: skip
     if jacobian is not None:
         flow = six(flow, jacobian)

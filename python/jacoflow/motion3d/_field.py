@@ -16,7 +16,7 @@ OPTIONS = frozenset(estimate_motion.__kwdefaults__ or ())
 """Options of the estimate that come from the field are refused by name."""
 
 FIELD_OWN = {
-    "sigma": "has covariances of its own",
+    "noise_std": "has covariances of its own",
     "cov": "has covariances of its own",
     "jacobian": "has a Jacobian of its own, which patches= uses",
     "projection": "is one of the plane",
@@ -44,20 +44,20 @@ def estimate_field_motion(
     K : array (3, 3)
         Camera matrix, px.
     spacing : px or None
-        Least distance of the points along rows and columns; default: twice the field's `correlation_length`, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than 4 correlation lengths `l`, which share windows, get larger covariances: times `4 pi l^2 / spacing^2`. Errors go together farther still; the motion's covariance sums that as far as residuals tell it (`correlation_length` of `estimate_motion`), and has in it that all flow may be too short or too long by one share, up to what would be the whole error of the quarter of the field's points that tell it best (`flow_scale_std`), and that it may be off by one displacement, of 0.4 deviations of a point (`flow_bias_std`).
+        Least distance of the points along rows and columns; default: twice the field's `correlation_length`, but at least 8 px, and closer where a `region` would have fewer than 30 points. Never below the `correlation_length`. Points closer than 4 correlation lengths `l`, which share windows, get larger covariances: times `4 pi l^2 / spacing^2`. Errors go together farther still; the motion's covariance sums that where residuals show it (`correlation_length` of `estimate_motion`), and has in it that all flow may be too short or too long by one share, up to what would be the whole error of the quarter of the field's points that determine it best (`flow_scale_std`), and that it may be off by one displacement, of 0.4 deviations of a point (`flow_bias_std`).
     max_points : int or None
         Most points, of the `region` if there is one; the grid is made coarser to keep to it.
     region : (x, y, width, height), px, or None
         Only points in this rectangle: those of one object, whose motion relative to the camera is then found.
     scene : MotionEstimate or None
-        The motion of the whole scene. Its rotation, which is the camera's, is then what is known beforehand of the thing's in `region`: in a narrow field a rotation looks like a sideways motion, and with a slanted surface that trades against the approach.
+        The motion of the whole scene. Its rotation, which is the camera's, is then what is known beforehand of the object's rotation in `region`: in a narrow field a rotation looks like a sideways motion, and with a slanted surface that trades against the approach.
     object_rotation_std : float, rad/frame
-        Standard deviation of the thing's own rotation, per axis; it matters only with `scene`.
+        Standard deviation of the object's own rotation, per axis; it matters only with `scene`.
     patches : px or None
         Side of square windows, at least 8 px, each of which becomes one patch with the six numbers at its middle, flow and Jacobian, from a fit of second order to those of its pixels; the points returned are the middles. Covariances are those of independent pixels times the pixels over the disjoint windows in the patch, of the area `58 l^2` over which errors go together, and more where flow has edges in it. Six numbers pay for
         2 to 10 large patches (60 px and more) seen through a long lens. Windows lie side by side in the frame or `region`; those of which less than half is valid are left out. Not with `spacing`, `max_points`, `scene` and `robust`.
     **options
-        Those of `estimate_motion` but `sigma`, `cov`, `jacobian` and `projection`, which are the field's own; `robust` is True by default without `patches`.
+        Those of `estimate_motion` but `noise_std`, `cov`, `jacobian` and `projection`, which are the field's own; `robust` is True by default without `patches`.
 
     Raises
     ------

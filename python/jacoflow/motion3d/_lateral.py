@@ -24,10 +24,10 @@ class LateralEstimate:
     """Variance of `angle`, rad^2: (29), (31) or that of shrunk weights, with the moments of the depths less their noise; infinite where noise explains all of the flow."""
     crlb: float
     """The Cramér-Rao bound `sigma^2 / (n m2)` with the same moments, rad^2."""
-    sigma: float
+    noise_std: float
     """Standard deviation of each component of the flow, units of flow: as given, else estimated."""
     inv_depth: NDArray[np.float64]
-    """Inverse depths (N,), units of |u| per frame: the flow along the direction, each with the deviation `sigma`. NaN where the flow is not finite."""
+    """Inverse depths (N,), units of |u| per frame: the flow along the direction, each with the deviation `noise_std`. NaN where the flow is not finite."""
 
     @property
     def translation(self) -> NDArray[np.float64]:
@@ -56,7 +56,7 @@ class LateralBound:
     """Noise, units of flow, above which weights of 1 beat maximum likelihood: `sqrt(m2) std(nu) / |mean(nu)|`."""
 
 
-def estimate_lateral(flow: ArrayLike, *, sigma: float | None = None, weights: Literal["shrunk", "ml", "ones"] = "shrunk") -> LateralEstimate:
+def estimate_lateral(flow: ArrayLike, *, noise_std: float | None = None, weights: Literal["shrunk", "ml", "ones"] = "shrunk") -> LateralEstimate:
     """The direction of a translation along the image plane (`u_z = 0`) of a camera that does not turn, from flow at N points, wherever they are.
 
     Source: section 5 of T. Endoh, T. Toriu, N. Tagawa, "The Maximum Likelihood Estimator is Not 'Optimal' on 3-D Motion Estimation from Noisy Optical Flow". The variances are of first order: they hold while they are small beside 1 rad^2.
@@ -65,7 +65,7 @@ def estimate_lateral(flow: ArrayLike, *, sigma: float | None = None, weights: Li
     ----------
     flow : array (N, 2), per frame on the plane at distance 1, or px/frame of a camera with square pixels
         Flow; rows that are not finite are left out.
-    sigma : float, units of flow
+    noise_std : float, units of flow
         Standard deviation of each component. None: estimated from the flow across the direction.
     weights : "shrunk", "ml" or "ones"
         "ml": each point's own depth, maximum likelihood (28), the principal axis of `sum f f^t`. "ones": the same for all (30), `atan2(sum f_y, sum f_x)`, better in large noise. "shrunk": depths drawn to their mean by what noise leaves of their scatter, never worse than either.
@@ -77,21 +77,21 @@ def estimate_lateral(flow: ArrayLike, *, sigma: float | None = None, weights: Li
     NotObservableError
         When all flow is zero, or with "ones" its sum.
 
-    >>> round(float(np.degrees(estimate_lateral([[0.9, 0.9], [1.1, 1.1]], sigma=0.01).angle)))
+    >>> round(float(np.degrees(estimate_lateral([[0.9, 0.9], [1.1, 1.1]], noise_std=0.01).angle)))
     45
     """
     word("weights", weights)
-    return LateralEstimate(**_motion3d_lateral(flow, None if sigma is None else number("sigma", sigma), weights))
+    return LateralEstimate(**_motion3d_lateral(flow, None if noise_std is None else number("noise_std", noise_std), weights))
 
 
-def lateral_bound(inv_depth: ArrayLike, *, sigma: float) -> LateralBound:
+def lateral_bound(inv_depth: ArrayLike, *, noise_std: float) -> LateralBound:
     """What any estimator, and each of those of `estimate_lateral`, makes of points with these true inverse depths: variances in rad^2, for the design of an experiment.
 
     Parameters
     ----------
     inv_depth : array (N,), units of |u| per frame
         True inverse depths; values that are not finite are left out.
-    sigma : float, units of flow
+    noise_std : float, units of flow
         Standard deviation of each component of the flow.
 
     Raises
@@ -101,7 +101,7 @@ def lateral_bound(inv_depth: ArrayLike, *, sigma: float) -> LateralBound:
     NotObservableError
         When all points are infinitely far.
 
-    >>> round(lateral_bound(np.linspace(0.5, 1.5, 101), sigma=0.3).crossover, 5)
+    >>> round(lateral_bound(np.linspace(0.5, 1.5, 101), noise_std=0.3).crossover, 5)
     0.30369
     """
-    return LateralBound(**_motion3d_lateral_bound(inv_depth, number("sigma", sigma)))
+    return LateralBound(**_motion3d_lateral_bound(inv_depth, number("noise_std", noise_std)))

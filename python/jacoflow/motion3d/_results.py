@@ -85,7 +85,7 @@ class MotionEstimate:
     """Standard deviation of `approach_rate`, 1/frame, of the depths and of the motion."""
     inliers: NDArray[np.bool_]
     """Inliers (N,) of the motion."""
-    sigma: float
+    noise_std: float
     """Standard deviation of each flow component, given or estimated, in units of the flow; 1 where covariances were given."""
     residuals: Array
     """Residuals (N,) across the epipolar lines in units of noise (of six numbers: the root of the summed squares); NaN for points that are not finite."""

@@ -278,7 +278,7 @@ mod tests {
         let (mut held, mut all, mut narrower) = (0, 0, 0);
         for seed in 0..20 {
             let scene = Scene::new(motion, 500, 0.6, 0.05, seed, |x, y, _| smooth(x, y));
-            let found = estimate_motion(&scene.flow(), &Noise::Sigma(0.05), &options).unwrap();
+            let found = estimate_motion(&scene.flow(), &Noise::StandardDeviation(0.05), &options).unwrap();
             for k in 0..500 {
                 // Rates are normal where times are not.
                 let (contact, deviation) = (found.time_to_contact[k], found.time_to_contact_std[k]);

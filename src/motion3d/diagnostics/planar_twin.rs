@@ -303,7 +303,7 @@ mod tests {
         };
         let flow: Vec<[f64; 2]> = points.iter().map(seen).collect();
         let flow = Flow::Plane { points: &points, flow: &flow, camera: None };
-        let whitening = Whitening::new(&flow, &Noise::Sigma(1e-3), Placement::Midpoint);
+        let whitening = Whitening::new(&flow, &Noise::StandardDeviation(1e-3), Placement::Midpoint);
         let start = whitening.whitened();
         for taken in [turn, motion.derotation(), Derotation::new(&Vector3::new(0.0, 0.1, -0.1))] {
             let fit = PlaneFlow::fit(&whitening.derotated(&start, taken)).unwrap();

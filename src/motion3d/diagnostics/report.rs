@@ -40,9 +40,9 @@ pub(crate) fn report(
     all: &Observations,
     inliers: &Observations,
     solution: &Solution,
-    sigma: f64,
+    noise_std: f64,
 ) -> MotionEstimate {
-    let mut out = MotionEstimate::nothing(flow.len(), solution.status, sigma);
+    let mut out = MotionEstimate::nothing(flow.len(), solution.status, noise_std);
     let motion = &solution.motion;
     out.motion = *motion;
     out.likelihood = solution.likelihood;
@@ -128,10 +128,10 @@ pub(crate) fn rotation_report(
     all: &Observations,
     inliers: &Observations,
     rotation: &RotationOnly,
-    sigma: f64,
+    noise_std: f64,
     options: &MotionOptions,
 ) -> MotionEstimate {
-    let mut out = MotionEstimate::nothing(flow.len(), Status::RotationOnly, sigma);
+    let mut out = MotionEstimate::nothing(flow.len(), Status::RotationOnly, noise_std);
     let moved = rotation_shift(inliers, &rotation.covariance) * to_plane(flow.camera());
     let mut covariance = rotation.covariance;
     if let Some(length) = options.correlation_length.filter(|length| *length > 0.0) {

@@ -57,7 +57,7 @@ pub(crate) struct Evidence<'a> {
     /// Whether the depths are mostly noise.
     pub low: bool,
     /// Whether the covariance describes the shape of the confidence region.
-    pub told: bool,
+    pub described: bool,
     /// Whether the noise is what the motion leaves.
     pub unknown: bool,
     /// Motions of other points.
@@ -106,7 +106,7 @@ pub(crate) fn judge(
         Status::IllConditioned
     } else if planar || others.count() > 0 {
         Status::Ambiguous
-    } else if !evidence.told
+    } else if !evidence.described
         || deviation.is_nan()
         || deviation > WIDE
         || far(inliers, &motions, deviation, evidence.deviation, rng.stream(1))

@@ -214,8 +214,8 @@ mod tests {
                 let (t, d) = (turned.rows.g * motion.u(), turned.flow - turned.rows.r * motion.w());
                 let across = (t.y * d.x - t.x * d.y) / t.norm();
                 assert!(across.abs() < 1e-14, "{rotation:?}: {across}");
-                let told = turn.half_way(&motion.u()).depth(t.dot(&d) / t.norm_squared());
-                assert!((told * depth - 1.0).abs() < 1e-6, "{rotation:?}: {told} {depth}");
+                let got = turn.half_way(&motion.u()).depth(t.dot(&d) / t.norm_squared());
+                assert!((got * depth - 1.0).abs() < 1e-6, "{rotation:?}: {got} {depth}");
                 let moved = turn.displacement(&motion.u(), first, 1.0 / depth);
                 assert!((moved - (Vector2::from(second) - Vector2::from(first))).norm() < 1e-14, "{rotation:?}");
             }
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_of_the_second_view_spreads_as_told() {
+    fn noise_of_the_second_view_is_multiplied_by_the_slope() {
         let turn = Derotation::new(&Vector3::new(0.2, -0.1, 0.3));
         let (first, second, h) = ([0.3, -0.2], [0.35, -0.1], 1e-6);
         let here = turn.out_of(first, second).unwrap();

@@ -34,7 +34,7 @@ pub enum Noise<'a> {
     #[default]
     Unknown,
     /// Standard deviation of each component, in the unit of the flow.
-    Sigma(f64),
+    StandardDeviation(f64),
     /// A covariance for every point, row by row: 4 values on the plane, 9 on the sphere, in squared units of
     /// the flow. Points whose covariance is not finite are left out; others must be symmetric and positive
     /// definite, on the sphere across the bearing. A point whose smaller variance is below a millionth of the
@@ -121,8 +121,8 @@ impl Flow<'_> {
         }
         match noise {
             // The sums of squares that an estimate is made of are of its fourth power.
-            Noise::Sigma(sigma) if !(*sigma > 0.0 && sigma.powi(4).is_normal()) => {
-                Err(Error::argument("sigma", "a positive number between 1e-75 and 1e75", sigma))
+            Noise::StandardDeviation(noise_std) if !(*noise_std > 0.0 && noise_std.powi(4).is_normal()) => {
+                Err(Error::argument("noise_std", "a positive number between 1e-75 and 1e75", noise_std))
             }
             Noise::Covariances(c) if c.len() != values * points => {
                 let expected = format!("{points} matrices of {values} values");

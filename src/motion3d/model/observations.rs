@@ -304,20 +304,20 @@ pub(crate) const MIN_NOISE: f64 = 1e-100;
 /// Points in units of their noise, and that in the flow's unit.
 pub(crate) struct Scaled {
     pub observations: Observations,
-    pub sigma: f64,
-    /// Whether `sigma` has to be estimated.
+    pub noise_std: f64,
+    /// Whether `noise_std` has to be estimated.
     pub unknown: bool,
     /// Whether the flow may be that of a rotation alone.
     pub may_turn: bool,
 }
 
 impl Scaled {
-    /// Takes `sigma` in units of the present noise to be the noise.
-    pub fn take(&mut self, sigma: f64) {
-        let sigma = sigma.max(ROUNDING * self.observations.median_flow()).max(MIN_NOISE);
-        if sigma.is_finite() {
-            self.observations.rescale(1.0 / sigma);
-            self.sigma *= sigma;
+    /// Takes `noise_std` in units of the present noise to be the noise.
+    pub fn take(&mut self, noise_std: f64) {
+        let noise_std = noise_std.max(ROUNDING * self.observations.median_flow()).max(MIN_NOISE);
+        if noise_std.is_finite() {
+            self.observations.rescale(1.0 / noise_std);
+            self.noise_std *= noise_std;
         }
     }
 }

@@ -157,9 +157,11 @@ impl MotionOptions {
                     points_per_independent_sample,
                 ))
             }
-            Some(_) if matches!(noise, Noise::Unknown) => {
-                Err(Error::argument("points_per_independent_sample", "a noise that is known", "sigma and cov left out"))
-            }
+            Some(_) if matches!(noise, Noise::Unknown) => Err(Error::argument(
+                "points_per_independent_sample",
+                "a noise that is known",
+                "noise_std and cov left out",
+            )),
             _ => Ok(()),
         }
     }

@@ -112,7 +112,7 @@ pub struct MotionEstimate {
     /// Inliers of the motion (N).
     pub inliers: Vec<bool>,
     /// Standard deviation of the flow, given or estimated, in its unit; 1 where covariances were given.
-    pub sigma: f64,
+    pub noise_std: f64,
     /// Residuals across the epipolar lines (N), in units of noise; NaN for points left out as unusable.
     pub residuals: Vec<f64>,
     /// Other motions that explain the flow about as well, the best first.
@@ -140,7 +140,7 @@ impl MotionEstimate {
     }
 
     /// No motion, for N points.
-    pub(crate) fn nothing(n: usize, status: Status, sigma: f64) -> Self {
+    pub(crate) fn nothing(n: usize, status: Status, noise_std: f64) -> Self {
         let none = Motion { translation: [f64::NAN; 3], rotation: [f64::NAN; 3] };
         let nowhere = [[f64::NAN; 3]; 2];
         Self {
@@ -162,7 +162,7 @@ impl MotionEstimate {
             time_to_contact_std: vec![f64::NAN; n],
             approach: (f64::NAN, f64::NAN),
             inliers: vec![false; n],
-            sigma,
+            noise_std,
             residuals: vec![f64::NAN; n],
             alternatives: Vec::new(),
             likelihood: Likelihood { motion: none, covariance: UNKNOWN, tangent: nowhere, cost: f64::NAN },

@@ -41,7 +41,7 @@ impl Whitening<'_> {
                 let axes = tangents(&Vector3::from(bearings[k]).normalize());
                 symmetric(axes * Matrix3::from_row_slice(&c[9 * k..9 * k + 9]) * axes.transpose())
             }
-            (_, Noise::Sigma(sigma)) => Matrix2::identity() * (sigma * sigma),
+            (_, Noise::StandardDeviation(noise_std)) => Matrix2::identity() * (noise_std * noise_std),
             (_, Noise::Unknown) => Matrix2::identity(),
         }
     }

@@ -262,7 +262,7 @@ fn least_squares(system: &System) -> Option<RotationOnly> {
 /// As [`motion_bound`](crate::motion3d::motion_bound).
 pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces: &[[f64; 3]]) -> Result<MotionBound> {
     patches.check()?;
-    check_truth(&Noise::Sigma(1.0), motion)?;
+    check_truth(&Noise::StandardDeviation(1.0), motion)?;
     if surfaces.len() != patches.points.len() {
         let expected = format!("{} surfaces, one for each point", patches.points.len());
         return Err(Error::argument("inv_depth", expected, surfaces.len()));

@@ -162,15 +162,15 @@ fn with_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -
     }
     let few = keeps("motion3d.single_noise") && scaled.observations.n < SELECTED;
     let single_noise = few.then(|| single_noise::noise_std(&scaled.observations, rng)).flatten();
-    let single_noise = single_noise.map(|sigma| sigma * scaled.sigma);
+    let single_noise = single_noise.map(|noise_std| noise_std * scaled.noise_std);
     let found = noise_scale::consensus(whitening, scaled, rng)?;
-    let Some(sigma) = single_noise.map(|sigma| sigma / scaled.sigma) else { return Some(found) };
-    let shorter = single_noise::shortening(&scaled.observations, &found, sigma);
+    let Some(noise_std) = single_noise.map(|noise_std| noise_std / scaled.noise_std) else { return Some(found) };
+    let shorter = single_noise::shortening(&scaled.observations, &found, noise_std);
     // If both noises are nearly equal, the choice does no harm.
     let (n, k) = (scaled.observations.n, found.inliers.len());
-    let doubtful = k < n && sigma > APART_NOISE && (shorter < SURE || k < FEWEST);
+    let doubtful = k < n && noise_std > APART_NOISE && (shorter < SURE || k < FEWEST);
     if shorter < WORTH {
-        scaled.take(sigma);
+        scaled.take(noise_std);
         let found = in_noise(whitening, scaled, false, rng)?;
         return Some(Consensus { doubtful: doubtful || found.doubtful, single_noise: shorter < -LONGER, ..found });
     }
@@ -188,9 +188,9 @@ fn in_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, unknown: bool, rng: 
             if few { of_candidates(&scaled.observations, candidates.clone(), rng)?.motion } else { candidates[0].0 };
         let mut changed = false;
         if unknown {
-            let sigma = noise_scale::noise(&depths(&scaled.observations, &best).e[..scaled.observations.n]);
-            changed = (sigma - 1.0).abs() > SETTLED_NOISE;
-            scaled.take(sigma);
+            let noise_std = noise_scale::noise(&depths(&scaled.observations, &best).e[..scaled.observations.n]);
+            changed = (noise_std - 1.0).abs() > SETTLED_NOISE;
+            scaled.take(noise_std);
         }
         let fitted = scaled.observations.subset(&inliers_of(&scaled.observations, &best));
         if decides(whitening, &fitted, &best) {

@@ -33,10 +33,10 @@ const MIN_INLIER_SHARE: f64 = 0.5;
 /// Returns the motion with the most inliers in the noise of these inliers, which becomes the unit of the
 /// points.
 pub(crate) fn consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
-    let flow = scaled.observations.median_flow() * scaled.sigma;
+    let flow = scaled.observations.median_flow() * scaled.noise_std;
     let mut larger: Option<(Consensus, f64)> = None;
     for share in FIRST_SHARES {
-        scaled.take(share * flow / scaled.sigma);
+        scaled.take(share * flow / scaled.noise_std);
         let Some(found) = in_noise(whitening, scaled, true, rng) else { break };
         let enough = larger
             .as_ref()
@@ -47,12 +47,12 @@ pub(crate) fn consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: Cou
             return Some(found);
         }
         if larger.is_none() {
-            larger = Some((found, scaled.sigma));
+            larger = Some((found, scaled.noise_std));
         }
     }
     // A moving object looks the same as correlated errors of the flow.
-    let (found, sigma) = larger?;
-    scaled.take(sigma / scaled.sigma);
+    let (found, noise_std) = larger?;
+    scaled.take(noise_std / scaled.noise_std);
     Some(found)
 }
 
@@ -70,13 +70,13 @@ pub(crate) fn larger(observations: &Observations, motion: &Motion) -> f64 {
     if variance > 1.0 + chance { variance } else { 1.0 }
 }
 
-/// The fixed point of "the root mean square of the residuals below 2.5 sigma, divided by that of a cut normal
-/// distribution"; the five unknowns take their share away.
+/// The fixed point of "the root mean square of the residuals below 2.5 standard deviations, divided by that
+/// of a cut normal distribution"; the five unknowns take their share away.
 pub(crate) fn noise(residuals: &[f64]) -> f64 {
-    let mut sigma = 1.0;
+    let mut noise_std = 1.0;
     for _ in 0..STEPS {
         let (mut sum, mut count) = (0.0, 0usize);
-        for e in residuals.iter().filter(|e| e.abs() < CUT * sigma) {
+        for e in residuals.iter().filter(|e| e.abs() < CUT * noise_std) {
             sum += e * e;
             count += 1;
         }
@@ -84,11 +84,11 @@ pub(crate) fn noise(residuals: &[f64]) -> f64 {
             break;
         }
         let next = (sum / (CUT_VARIANCE * (count - UNKNOWNS) as f64)).sqrt();
-        let settled = (next - sigma).abs() < 1e-6 * sigma;
-        sigma = next;
+        let settled = (next - noise_std).abs() < 1e-6 * noise_std;
+        noise_std = next;
         if settled {
             break;
         }
     }
-    sigma
+    noise_std
 }

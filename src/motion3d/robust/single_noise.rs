@@ -12,7 +12,7 @@ use crate::motion3d::solver::likelihood::minima;
 pub(crate) fn noise_std(observations: &Observations, rng: CounterRng) -> Option<f64> {
     let best = minima(observations, true, rng.stream(20)).first()?.equations.cost;
     let degrees = observations.n.saturating_sub(UNKNOWNS).max(1);
-    Some((best / degrees as f64).sqrt()).filter(|sigma| sigma.is_finite() && *sigma > 0.0)
+    Some((best / degrees as f64).sqrt()).filter(|noise_std| noise_std.is_finite() && *noise_std > 0.0)
 }
 
 /// By how much the mean square may exceed what the median says of it.
@@ -27,13 +27,13 @@ pub(crate) fn one_noise(residuals: &[f64]) -> bool {
     mean <= TAILS * median(&mut squares).unwrap_or(0.0) / std::f64::consts::LN_2
 }
 
-/// By how much, in nats, outliers shorten the description of the residuals: that with `sigma`, in present
+/// By how much, in nats, outliers shorten the description of the residuals: that with `noise_std`, in present
 /// units of noise, for all points, less that with the noise of the inliers and the others anywhere.
 ///
 /// Lengths of descriptions (J. Rissanen 1978): `-ln` of the densities, that of an outlier uniform over the
 /// residuals' range, and `ln C(n, k)` for which points they are. A selection among few points makes residuals
 /// small that the unknowns do not account for.
-pub(crate) fn shortening(observations: &Observations, found: &Consensus, sigma: f64) -> f64 {
+pub(crate) fn shortening(observations: &Observations, found: &Consensus, noise_std: f64) -> f64 {
     let (n, k) = (observations.n, found.inliers.len());
     if k >= n {
         return 0.0;
@@ -42,11 +42,11 @@ pub(crate) fn shortening(observations: &Observations, found: &Consensus, sigma: 
     let sum = |k: &u32| seen.e[*k as usize].powi(2);
     let own = (found.inliers.iter().map(sum).sum::<f64>() / k.saturating_sub(UNKNOWNS).max(1) as f64).sqrt();
     let range = 2.0 * seen.e[..n].iter().fold(0.0f64, |most, e| most.max(e.abs()));
-    let normal = |count: usize, sigma: f64| {
+    let normal = |count: usize, noise_std: f64| {
         let free = count.saturating_sub(UNKNOWNS) as f64;
-        free * (sigma.ln() + 0.5) + 0.5 * count as f64 * (2.0 * std::f64::consts::PI).ln()
+        free * (noise_std.ln() + 0.5) + 0.5 * count as f64 * (2.0 * std::f64::consts::PI).ln()
     };
     let chosen: f64 = (0..n - k).map(|i| ((n - i) as f64 / (i + 1) as f64).ln()).sum();
     let apart = normal(k, own) + (n - k) as f64 * range.ln() + chosen;
-    normal(n, sigma) - apart
+    normal(n, noise_std) - apart
 }

@@ -105,13 +105,13 @@ impl Tree {
         ranges.filter(|places| places.len() >= least).collect()
     }
 
-    /// The `k` nearest of the points at the places `asked`, themselves left out; `k` is less than the number
+    /// The `k` nearest of the points at the places `queries`, themselves left out; `k` is less than the number
     /// of points.
-    pub fn nearest(&self, asked: &[u32], k: usize) -> Neighbours {
-        let mut places = vec![0u32; asked.len() * k];
-        places.par_chunks_mut(BAND * k).zip(asked.par_chunks(BAND)).for_each(|(out, asked)| {
+    pub fn nearest(&self, queries: &[u32], k: usize) -> Neighbours {
+        let mut places = vec![0u32; queries.len() * k];
+        places.par_chunks_mut(BAND * k).zip(queries.par_chunks(BAND)).for_each(|(out, queries)| {
             let mut found = Vec::with_capacity(6 * k + LEAF);
-            for (out, &place) in out.chunks_exact_mut(k).zip(asked) {
+            for (out, &place) in out.chunks_exact_mut(k).zip(queries) {
                 self.search(place, k, &mut found);
                 nest(&mut found, k);
                 out.iter_mut().zip(&found).for_each(|(to, &key)| *to = key as u32);
@@ -209,9 +209,9 @@ mod tests {
 
     fn check(positions: &[[f64; 3]], k: usize) {
         let tree = Tree::new(positions);
-        let asked: Vec<u32> = (0..positions.len() as u32).rev().step_by(2).collect();
-        let found = tree.nearest(&asked, k);
-        for (i, &place) in asked.iter().enumerate() {
+        let queries: Vec<u32> = (0..positions.len() as u32).rev().step_by(2).collect();
+        let found = tree.nearest(&queries, k);
+        for (i, &place) in queries.iter().enumerate() {
             let at = positions[tree.order()[place as usize] as usize];
             let own = |j: &usize| *j != tree.order()[place as usize] as usize;
             let mut all: Vec<f32> =
@@ -245,7 +245,7 @@ mod tests {
         check(&(0..20).map(at).collect::<Vec<_>>(), 16);
         let line: Vec<[f64; 3]> = (0..100).map(|k| [f64::from(k % 10), 0.0, 0.0]).collect();
         check(&line, 32);
-        let astray: Vec<[f64; 3]> = (0..100).map(|k| [f64::from(k), if k == 7 { 1e200 } else { 0.0 }, 0.0]).collect();
-        check(&astray, 32);
+        let distant: Vec<[f64; 3]> = (0..100).map(|k| [f64::from(k), if k == 7 { 1e200 } else { 0.0 }, 0.0]).collect();
+        check(&distant, 32);
     }
 }

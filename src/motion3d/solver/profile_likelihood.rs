@@ -104,15 +104,15 @@ impl ProfileLikelihood<'_> {
     /// the valley: it has ends, and is not so long that a covariance has none of its shape.
     pub fn lengthened(&self, covariance: &Matrix5, mut weights: impl FnMut(&Motion) -> Vec<f64>) -> (Matrix5, bool) {
         let axes = self.bent(covariance);
-        let (mut out, mut told) = (*covariance, true);
+        let (mut out, mut described) = (*covariance, true);
         for rank in 0..axes {
             match self.along(&out, covariance, rank, &mut weights) {
-                Some((longer, ends)) => (out, told) = (longer, told && ends == 2),
-                None => told = false,
+                Some((longer, ends)) => (out, described) = (longer, described && ends == 2),
+                None => described = false,
             }
         }
         let share = direction_deviation(&out).to_radians() / spread(&self.observations.site);
-        (out, told && (axes == 0 || share < BEYOND))
+        (out, described && (axes == 0 || share < BEYOND))
     }
 
     /// The covariance `so_far` with both ends along one axis of the direction by `first`: of its eigenvectors

@@ -39,9 +39,9 @@ pub(crate) struct Prediction {
 
 struct Regress<'a> {
     sites: &'a [Site],
-    asked: &'a [u32],
+    queries: &'a [u32],
     neighbours: &'a Neighbours,
-    /// Index of the first of `asked` in `neighbours`.
+    /// Index of the first of `queries` in `neighbours`.
     first: usize,
     k: usize,
     spherical: bool,
@@ -91,13 +91,13 @@ impl Kernel<f64> for Regress<'_> {
             s2: [0.0; MAX_LANES],
         };
         let (one, tail) = (V::constant(1.0), V::constant(TAIL));
-        for start in (0..self.asked.len()).step_by(V::LANES) {
-            let lanes = V::LANES.min(self.asked.len() - start);
+        for start in (0..self.queries.len()).step_by(V::LANES) {
+            let lanes = V::LANES.min(self.queries.len() - start);
             let mut from = [Site::default(); MAX_LANES];
             let mut axes = [None; MAX_LANES];
             let mut scale = [0.0; MAX_LANES];
             for lane in 0..lanes {
-                from[lane] = self.sites[self.asked[start + lane] as usize];
+                from[lane] = self.sites[self.queries[start + lane] as usize];
                 if self.spherical {
                     axes[lane] = Some(tangents(&Vector3::from(from[lane].at)));
                 }
@@ -154,24 +154,24 @@ impl Kernel<f64> for Regress<'_> {
     }
 }
 
-/// Predicts the depth of each of `asked` (places in the tree) from the `k` nearest of its neighbours, itself
+/// Predicts the depth of each of `queries` (places in the tree) from the `k` nearest of its neighbours, itself
 /// left out.
 ///
 /// Weights `[(1 - (d / h)^3)^2 + 0.001] s^2` with the distance `h` of the `k`-th; `c = sum l_j^2 v_j` of the
 /// smoother's weights `l`.
 pub(crate) fn regress(
     sites: &[Site],
-    asked: &[u32],
+    queries: &[u32],
     neighbours: &Neighbours,
     k: usize,
     spherical: bool,
     level: Level,
 ) -> Prediction {
-    let mut out = Prediction { q: vec![0.0; asked.len()], c: vec![0.0; asked.len()] };
-    let bands = out.q.par_chunks_mut(BAND).zip(out.c.par_chunks_mut(BAND)).zip(asked.par_chunks(BAND));
-    bands.enumerate().for_each(|(band, ((q, c), asked))| {
+    let mut out = Prediction { q: vec![0.0; queries.len()], c: vec![0.0; queries.len()] };
+    let bands = out.q.par_chunks_mut(BAND).zip(out.c.par_chunks_mut(BAND)).zip(queries.par_chunks(BAND));
+    bands.enumerate().for_each(|(band, ((q, c), queries))| {
         let first = band * BAND;
-        dispatch(level, Regress { sites, asked, neighbours, first, k, spherical, q, c });
+        dispatch(level, Regress { sites, queries, neighbours, first, k, spherical, q, c });
     });
     out
 }
@@ -215,11 +215,11 @@ mod tests {
                 s2: 0.5 + rng.stream(2).uniform(i as u64),
             };
             let sites: Vec<Site> = tree.points().iter().enumerate().map(site).collect();
-            let asked: Vec<u32> = (0..150).step_by(7).collect();
-            let lists = tree.nearest(&asked, 32);
+            let queries: Vec<u32> = (0..150).step_by(7).collect();
+            let lists = tree.nearest(&queries, 32);
             for k in [8, 32] {
-                let got = regress(&sites, &asked, &lists, k, spherical, Level::detect());
-                for (i, &place) in asked.iter().enumerate() {
+                let got = regress(&sites, &queries, &lists, k, spherical, Level::detect());
+                for (i, &place) in queries.iter().enumerate() {
                     let from = &sites[place as usize];
                     let flat = Matrix2x3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
                     let axes = if spherical { tangents(&Vector3::from(from.at)) } else { flat };

@@ -23,7 +23,7 @@ fn silently_wrong(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {
 fn a_narrow_field_is_not_trusted() {
     let lateral = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
     let (mut confident, mut wrong) = (0, 0);
-    for (motion, h, n, sigma) in [
+    for (motion, h, n, noise_std) in [
         (oblique(), 0.02, 60, 0.1),
         (oblique(), 0.1, 60, 0.01),
         (oblique(), 0.1, 60, 0.03),
@@ -36,11 +36,11 @@ fn a_narrow_field_is_not_trusted() {
     ] {
         for depth in [false, true] {
             let (sure, off) = silently_wrong(40, |seed| {
-                Scene::new(motion, n, h, sigma, seed, |x, y, r| if depth { smooth(x, y) } else { 0.5 + r })
+                Scene::new(motion, n, h, noise_std, seed, |x, y, r| if depth { smooth(x, y) } else { 0.5 + r })
             });
             confident += sure;
             wrong += off;
-            assert!(off <= 3, "{motion:?} {h} {n} {sigma}: {off} of {sure}");
+            assert!(off <= 3, "{motion:?} {h} {n} {noise_std}: {off} of {sure}");
         }
     }
     assert!(confident > 240 && wrong * 100 <= confident, "{wrong} of {confident}");

@@ -43,7 +43,7 @@ fn coverage(length: Option<f64>) -> (f64, f64) {
         let options =
             MotionOptions { placement: Placement::Start, correlation_length: length, ..MotionOptions::default() };
         let given = Flow::Plane { points: &points, flow: &flow, camera: None };
-        let found = estimate_motion(&given, &Noise::Sigma(SIGMA), &options).unwrap();
+        let found = estimate_motion(&given, &Noise::StandardDeviation(SIGMA), &options).unwrap();
         let square = mahalanobis(&found, &motion);
         inside += u32::from(square < ELLIPSOID);
         sum += square / 5.0;
@@ -72,7 +72,7 @@ fn it_is_no_smaller_than_that_of_independent_points() {
             points_per_independent_sample,
             ..MotionOptions::default()
         };
-        estimate_motion(&given, &Noise::Sigma(SIGMA), &options).unwrap().direction_std
+        estimate_motion(&given, &Noise::StandardDeviation(SIGMA), &options).unwrap().direction_std
     };
     let alone = told(None, None);
     assert_eq!(told(Some(0.0), None), alone);
@@ -81,6 +81,6 @@ fn it_is_no_smaller_than_that_of_independent_points() {
     // Noise already given for many that share one error covers it.
     assert!((told(Some(LENGTH), Some(500.0)) - told(None, Some(500.0))).abs() < 1e-9 * alone);
     let wrong = MotionOptions { correlation_length: Some(-1.0), ..MotionOptions::default() };
-    let error = estimate_motion(&given, &Noise::Sigma(SIGMA), &wrong).unwrap_err().to_string();
+    let error = estimate_motion(&given, &Noise::StandardDeviation(SIGMA), &wrong).unwrap_err().to_string();
     assert!(error.starts_with("correlation_length: "), "{error}");
 }

@@ -16,12 +16,12 @@ fn run(scene: &Scene, noise: &Noise<'_>) -> MotionEstimate {
 #[test]
 fn too_few_points_are_told() {
     let scene = Scene::oblique(4, 0.0, 1);
-    let found = run(&scene, &Noise::Sigma(1e-3));
+    let found = run(&scene, &Noise::StandardDeviation(1e-3));
     assert_eq!(found.status, Status::TooFewPoints);
     assert!(found.motion.translation[0].is_nan() && found.inverse_depth.len() == 4);
     let none = Flow::Plane { points: &[], flow: &[], camera: None };
     assert_eq!(estimate_motion(&none, &Noise::Unknown, &options()).unwrap().status, Status::TooFewPoints);
-    let few = run(&Scene::oblique(8, 0.0, 1), &Noise::Sigma(1e-6));
+    let few = run(&Scene::oblique(8, 0.0, 1), &Noise::StandardDeviation(1e-6));
     assert_eq!(few.status, Status::FewPoints);
 }
 
@@ -33,8 +33,8 @@ fn lengths_and_values_are_checked_by_name() {
         assert!(error.starts_with(word), "{error}");
     };
     refused(&Flow::Plane { points: &scene.points, flow: &scene.flow[1..], camera: None }, &Noise::Unknown, "flow: ");
-    for sigma in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-300, 1e300] {
-        refused(&scene.flow(), &Noise::Sigma(sigma), "sigma: ");
+    for noise_std in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-300, 1e300] {
+        refused(&scene.flow(), &Noise::StandardDeviation(noise_std), "noise_std: ");
     }
     refused(&scene.flow(), &Noise::Covariances(&[1.0; 7]), "cov: ");
     for wrong in [[-1.0, 0.0, 0.0, -1.0], [1.0, 0.0, 0.0, 0.0], [1.0, 0.5, 0.0, 1.0], [1.0, 2.0, 2.0, 1.0]] {
@@ -48,7 +48,7 @@ fn a_camera_that_only_turns_or_stands_still() {
     for w in [W, [0.0; 3]] {
         let motion = Motion { translation: [0.0; 3], rotation: w };
         let mut scene = Scene::new(motion, 300, 0.6, 0.01, 5, |_, _, _| 0.0);
-        for noise in [Noise::Sigma(0.01), Noise::Unknown] {
+        for noise in [Noise::StandardDeviation(0.01), Noise::Unknown] {
             for robust in [false, true] {
                 let options = MotionOptions { robust, ..options() };
                 let found = estimate_motion(&scene.flow(), &noise, &options).unwrap();
@@ -90,7 +90,7 @@ fn a_plane_has_two_motions() {
     let motion = Motion::new([0.6, 0.2, 0.75], W);
     let n = Vector3::new(0.3, -0.2, 0.9);
     let scene = Scene::new(motion, 400, 0.6, 0.005, 3, |x, y, _| 0.9 + 0.3 * 0.6 * x - 0.2 * 0.6 * y);
-    let found = run(&scene, &Noise::Sigma(0.005));
+    let found = run(&scene, &Noise::StandardDeviation(0.005));
     assert_eq!(found.status, Status::Ambiguous);
     let twin = Motion::new(n.into(), (Vector3::from(W) + n.cross(&Vector3::from(motion.translation))).into());
     let both = [found.motion, found.alternatives[0].motion];
@@ -103,7 +103,7 @@ fn a_plane_has_two_motions() {
     // Along the image plane the other motion has half of the points behind the camera.
     let lateral = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
     let scene = Scene::new(lateral, 400, 0.6, 0.005, 3, |x, y, _| 0.9 + 0.3 * 0.6 * x - 0.2 * 0.6 * y);
-    let found = run(&scene, &Noise::Sigma(0.005));
+    let found = run(&scene, &Noise::StandardDeviation(0.005));
     assert_eq!(found.status, Status::Ok);
     assert!(found.motion.angle_to(&lateral).to_degrees() < 2.0);
 }
@@ -126,24 +126,24 @@ fn points_that_do_not_tell_of_all_unknowns() {
         ("a field of a millionth", Box::new(|k| [1e-6 * rng.uniform(2 * k), 1e-6 * rng.uniform(2 * k + 1)])),
     ];
     for (name, place) in &layouts {
-        for sigma in [0.0, 0.01] {
+        for noise_std in [0.0, 0.01] {
             let points: Vec<[f64; 2]> = (0..400).map(place).collect();
             let noise = rng.stream(7);
             let flow: Vec<[f64; 2]> = (0..400)
                 .map(|k| {
                     let exact = motion.plane_flow(points[k], 0.5 + rng.stream(1).uniform(k as u64));
-                    [0, 1].map(|j| exact[j] + sigma * noise.normal(2 * k as u64 + j as u64))
+                    [0, 1].map(|j| exact[j] + noise_std * noise.normal(2 * k as u64 + j as u64))
                 })
                 .collect();
             let flow = Flow::Plane { points: &points, flow: &flow, camera: None };
-            for given in [Noise::Sigma(if sigma > 0.0 { sigma } else { 1e-6 }), Noise::Unknown] {
+            for given in [Noise::StandardDeviation(if noise_std > 0.0 { noise_std } else { 1e-6 }), Noise::Unknown] {
                 for robust in [false, true] {
                     let found = estimate_motion(&flow, &given, &MotionOptions { robust, ..options() }).unwrap();
                     let told = matches!(found.status, Status::IllConditioned | Status::Ambiguous);
                     let told = told || *name == "a field of a millionth" && found.status == Status::RotationOnly;
                     assert!(
                         told,
-                        "{name}, sigma {sigma}, {given:?}, robust {robust}: {:?} {}",
+                        "{name}, noise_std {noise_std}, {given:?}, robust {robust}: {:?} {}",
                         found.status, found.direction_std
                     );
                 }
@@ -160,7 +160,7 @@ fn the_same_flow_everywhere() {
     for flow in [[0.0, 0.0], [0.3, 0.0], [0.0, -0.2]] {
         let all = vec![flow; 200];
         let given = Flow::Plane { points: &points, flow: &all, camera: None };
-        for noise in [Noise::Sigma(0.01), Noise::Unknown] {
+        for noise in [Noise::StandardDeviation(0.01), Noise::Unknown] {
             for robust in [false, true] {
                 let found = estimate_motion(&given, &noise, &MotionOptions { robust, ..options() }).unwrap();
                 if flow == [0.0, 0.0] {
@@ -179,7 +179,7 @@ fn the_same_flow_everywhere() {
 #[test]
 fn noise_as_large_as_the_flow_is_told() {
     let scene = Scene::oblique(60, 0.6, 8);
-    let found = run(&scene, &Noise::Sigma(0.6));
+    let found = run(&scene, &Noise::StandardDeviation(0.6));
     assert!(
         matches!(found.status, Status::IllConditioned | Status::LowSnr | Status::RotationOnly | Status::Ambiguous),
         "{:?}",
@@ -191,7 +191,7 @@ fn noise_as_large_as_the_flow_is_told() {
 #[test]
 fn what_is_not_finite_changes_nothing_else() {
     let scene = Scene::oblique(200, 0.02, 7);
-    let want = run(&scene, &Noise::Sigma(0.02));
+    let want = run(&scene, &Noise::StandardDeviation(0.02));
     let mut dirty = scene.clone();
     for (k, (point, flow)) in
         [([f64::NAN, 0.0], [1.0, 1.0]), ([0.1, 0.1], [f64::INFINITY, 0.0])].into_iter().enumerate()
@@ -199,7 +199,7 @@ fn what_is_not_finite_changes_nothing_else() {
         dirty.points.insert(10 * k, point);
         dirty.flow.insert(10 * k, flow);
     }
-    let got = run(&dirty, &Noise::Sigma(0.02));
+    let got = run(&dirty, &Noise::StandardDeviation(0.02));
     assert_eq!(got.motion, want.motion);
     assert!(got.inverse_depth[0].is_nan() && got.residuals[10].is_nan() && !got.inliers[10] && got.inliers[1]);
 }
@@ -212,7 +212,7 @@ fn a_point_on_the_epipole_has_no_weight() {
     let epipole = [0.05, -0.03];
     with.points.push(epipole);
     with.flow.push(motion.plane_flow(epipole, 3.0));
-    let found = run(&with, &Noise::Sigma(1e-6));
+    let found = run(&with, &Noise::StandardDeviation(1e-6));
     assert!(found.motion.angle_to(&motion) < 1e-6, "{}", found.motion.angle_to(&motion));
     assert!(found.covariance.iter().flatten().all(|value| value.is_finite()));
 }
@@ -224,9 +224,12 @@ fn points_on_one_line_are_enough() {
     let points: Vec<[f64; 2]> = (0..200).map(|k| 1.2 * rng.uniform(k) - 0.6).map(|x| [x, 0.3 * x + 0.1]).collect();
     let flow: Vec<[f64; 2]> =
         points.iter().enumerate().map(|(k, &p)| motion.plane_flow(p, 0.5 + rng.stream(1).uniform(k as u64))).collect();
-    let found =
-        estimate_motion(&Flow::Plane { points: &points, flow: &flow, camera: None }, &Noise::Sigma(1e-6), &options())
-            .unwrap();
+    let found = estimate_motion(
+        &Flow::Plane { points: &points, flow: &flow, camera: None },
+        &Noise::StandardDeviation(1e-6),
+        &options(),
+    )
+    .unwrap();
     assert!(found.motion.angle_to(&motion) < 1e-4, "{}", found.motion.angle_to(&motion));
 }
 
@@ -235,7 +238,7 @@ fn points_on_one_line_are_enough() {
 fn two_planes_are_no_trap() {
     let motion = Motion::new([0.6, 0.2, 0.75], W);
     let scene = Scene::new(motion, 300, 0.6, 0.0, 7, |x, _, _| if x < 0.0 { 0.8 } else { 0.8 + 0.5 * x });
-    let found = run(&scene, &Noise::Sigma(1e-6));
+    let found = run(&scene, &Noise::StandardDeviation(1e-6));
     assert!(found.motion.angle_to(&motion) < 1e-4, "{:?}", found.motion);
 }
 
@@ -248,6 +251,6 @@ fn a_quadric_through_the_camera_is_no_trap() {
         let (x, y) = (0.6 * x, 0.6 * y);
         (0.5 * x * x - 0.3 * x * y + 0.8 * y * y + 0.4 * x + 1.0) / (0.2 * x - 0.3 * y + 1.1)
     });
-    let found = run(&scene, &Noise::Sigma(1e-6));
+    let found = run(&scene, &Noise::StandardDeviation(1e-6));
     assert!(found.motion.angle_to(&motion) < 1e-4, "{:?}", found.motion);
 }

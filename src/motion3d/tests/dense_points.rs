@@ -22,7 +22,7 @@ fn dense(motion: Motion, n: usize, scale: f64, seed: u64) -> Scene {
 
 /// As a field gives its points: with their errors' covariance times how many share it.
 fn run(scene: &Scene, points_per_independent_sample: Option<f64>, robust: bool) -> MotionEstimate {
-    let noise = Noise::Sigma(OWN * (SHARED as f64).sqrt());
+    let noise = Noise::StandardDeviation(OWN * (SHARED as f64).sqrt());
     let options = MotionOptions {
         placement: Placement::Start,
         robust,
@@ -85,7 +85,7 @@ fn what_points_share_is_a_number_and_their_noise_is_known() {
         estimate_motion(&scene.flow(), noise, &options).unwrap_err().to_string()
     };
     for wrong in [0.5, f64::NAN, f64::INFINITY] {
-        assert!(told(&Noise::Sigma(0.1), wrong).starts_with("points_per_independent_sample: "));
+        assert!(told(&Noise::StandardDeviation(0.1), wrong).starts_with("points_per_independent_sample: "));
     }
     assert!(told(&Noise::Unknown, 2.0).starts_with("points_per_independent_sample: "));
 }

@@ -24,7 +24,7 @@ fn exact_flow_gives_every_motion_both_signs() {
             let motion = Motion::new(u.map(|value| sign * value), w);
             let scene = Scene::new(motion, 200, 0.6, 0.0, 3, |_, _, r| 0.5 + r);
             for method in [Method::MaximumLikelihood, Method::Efficient] {
-                let found = estimate_motion(&scene.flow(), &Noise::Sigma(1e-6), &options(method)).unwrap();
+                let found = estimate_motion(&scene.flow(), &Noise::StandardDeviation(1e-6), &options(method)).unwrap();
                 assert!(angle(&found, &scene) < 1e-6, "{motion:?}: {}", angle(&found, &scene));
                 assert_eq!(found.status, Status::Ok);
                 let unknown = estimate_motion(&scene.flow(), &Noise::Unknown, &options(method)).unwrap();
@@ -47,7 +47,7 @@ fn the_sphere_gives_the_motion_all_around() {
         .collect();
     let flow = Flow::Sphere { bearings: &bearings, flow: &flow };
     for method in [Method::MaximumLikelihood, Method::Efficient] {
-        let found = estimate_motion(&flow, &Noise::Sigma(1e-6), &options(method)).unwrap();
+        let found = estimate_motion(&flow, &Noise::StandardDeviation(1e-6), &options(method)).unwrap();
         assert!(found.motion.angle_to(&motion) < 1e-8, "{}", found.motion.angle_to(&motion));
     }
 }
@@ -90,11 +90,11 @@ fn outliers_do_not_move_the_motion() {
     for (k, flow) in scene.flow.iter_mut().enumerate().filter(|(k, _)| k % 5 < 2) {
         *flow = [0, 1].map(|j| 4.0 * (2.0 * rng.uniform(2 * k as u64 + j) - 1.0));
     }
-    for noise in [Noise::Sigma(0.02), Noise::Unknown] {
+    for noise in [Noise::StandardDeviation(0.02), Noise::Unknown] {
         let options = MotionOptions { robust: true, ..options(Method::Auto) };
         let found = estimate_motion(&scene.flow(), &noise, &options).unwrap();
         assert!(angle(&found, &scene) < 2.0, "{}", angle(&found, &scene));
-        assert!((found.sigma / 0.02 - 1.0).abs() < 0.15, "{}", found.sigma);
+        assert!((found.noise_std / 0.02 - 1.0).abs() < 0.15, "{}", found.noise_std);
         let right = found.inliers.iter().enumerate().filter(|(k, inlier)| **inlier == (k % 5 >= 2)).count();
         assert!(right > 750, "{right}");
     }
@@ -151,7 +151,7 @@ fn a_known_rotation_is_heeded() {
         for method in [Method::MaximumLikelihood, Method::Efficient] {
             let run = |rotation_prior| {
                 let options = MotionOptions { robust, rotation_prior, ..options(method) };
-                estimate_motion(&scene.flow(), &Noise::Sigma(0.01), &options).unwrap()
+                estimate_motion(&scene.flow(), &Noise::StandardDeviation(0.01), &options).unwrap()
             };
             let (without, with) = (run(None), run(prior));
             assert!(
@@ -170,13 +170,13 @@ fn a_known_rotation_is_heeded() {
 fn weights_may_have_their_depths_from_elsewhere() {
     let scene = Scene::oblique(500, 0.2, 12);
     let with = MotionOptions { weight_depths: Some(scene.inverse_depth.clone()), ..options(Method::Efficient) };
-    let found = estimate_motion(&scene.flow(), &Noise::Sigma(0.2), &with).unwrap();
+    let found = estimate_motion(&scene.flow(), &Noise::StandardDeviation(0.2), &with).unwrap();
     assert!(found.efficient);
     for (got, want) in found.inverse_depth_smooth.iter().zip(&scene.inverse_depth) {
         assert_eq!(got, want);
     }
     let short = MotionOptions { weight_depths: Some(vec![1.0]), ..options(Method::Efficient) };
-    let error = estimate_motion(&scene.flow(), &Noise::Sigma(0.2), &short).unwrap_err().to_string();
+    let error = estimate_motion(&scene.flow(), &Noise::StandardDeviation(0.2), &short).unwrap_err().to_string();
     assert!(error.starts_with("weight_inv_depth: "), "{error}");
 }
 
@@ -186,7 +186,7 @@ fn weights_of_any_unit_and_quality_leave_the_covariance_honest() {
     let noise = CounterRng::new(55);
     let run = |scene: &Scene, depths: Vec<f64>| {
         let with = MotionOptions { weight_depths: Some(depths), ..options(Method::Efficient) };
-        estimate_motion(&scene.flow(), &Noise::Sigma(scene.sigma), &with).unwrap()
+        estimate_motion(&scene.flow(), &Noise::StandardDeviation(scene.noise_std), &with).unwrap()
     };
     let scene = Scene::oblique(300, 0.03, 5);
     let want = run(&scene, scene.inverse_depth.clone());
@@ -213,12 +213,13 @@ fn a_weight_that_is_not_finite_leaves_its_point_out() {
     let mut depths = scene.inverse_depth.clone();
     depths[3] = f64::NAN;
     let with = |weight_depths| MotionOptions { weight_depths: Some(weight_depths), ..options(Method::Efficient) };
-    let found = estimate_motion(&scene.flow(), &Noise::Sigma(0.05), &with(depths)).unwrap();
+    let found = estimate_motion(&scene.flow(), &Noise::StandardDeviation(0.05), &with(depths)).unwrap();
     assert!(found.efficient && !found.fell_back && !found.inliers[3] && found.inverse_depth[3].is_nan());
     let mut without = scene.clone();
     without.points.remove(3);
     without.flow.remove(3);
     without.inverse_depth.remove(3);
-    let want = estimate_motion(&without.flow(), &Noise::Sigma(0.05), &with(without.inverse_depth.clone())).unwrap();
+    let want = estimate_motion(&without.flow(), &Noise::StandardDeviation(0.05), &with(without.inverse_depth.clone()))
+        .unwrap();
     assert_eq!(found.motion, want.motion);
 }

@@ -59,10 +59,10 @@ impl Views {
         estimate_motion(&flow, noise, options).unwrap()
     }
 
-    fn noisy(mut self, sigma: f64, seed: u64) -> Self {
+    fn noisy(mut self, noise_std: f64, seed: u64) -> Self {
         let rng = CounterRng::new(seed);
         for (k, flow) in self.flow.iter_mut().enumerate() {
-            *flow = std::array::from_fn(|i| flow[i] + sigma * rng.normal((2 * k + i) as u64));
+            *flow = std::array::from_fn(|i| flow[i] + noise_std * rng.normal((2 * k + i) as u64));
         }
         self
     }
@@ -90,9 +90,9 @@ fn two_exact_views_give_the_exact_motion_and_depths() {
         for method in [Method::MaximumLikelihood, Method::Efficient] {
             for (noise, robust) in [
                 (Noise::Unknown, false),
-                (Noise::Sigma(1e-6), false),
+                (Noise::StandardDeviation(1e-6), false),
                 (Noise::Unknown, true),
-                (Noise::Sigma(1e-6), true),
+                (Noise::StandardDeviation(1e-6), true),
             ] {
                 let found = seen.run(&noise, &MotionOptions { method, robust, ..MotionOptions::default() });
                 let error = off(&found.motion, &truth);
@@ -112,14 +112,14 @@ fn slow_displacements_are_placed_half_way_and_left_alone() {
     let truth = rotating(0, 0.02);
     let seen = views(&truth, 300, 3, |_, r| 0.02 * (0.5 + r)).noisy(6e-4, 5);
     let options = MotionOptions { method: Method::MaximumLikelihood, ..MotionOptions::default() };
-    let found = seen.run(&Noise::Sigma(6e-4), &options);
+    let found = seen.run(&Noise::StandardDeviation(6e-4), &options);
     let half_way = Views {
         points: seen.points.iter().zip(&seen.flow).map(|(p, f)| [p[0] + 0.5 * f[0], p[1] + 0.5 * f[1]]).collect(),
         flow: seen.flow.clone(),
         half_way: Vec::new(),
     };
     let options = MotionOptions { placement: Placement::Start, ..options };
-    assert_eq!(found.motion, half_way.run(&Noise::Sigma(6e-4), &options).motion);
+    assert_eq!(found.motion, half_way.run(&Noise::StandardDeviation(6e-4), &options).motion);
 }
 
 #[test]
@@ -130,7 +130,8 @@ fn covariances_of_fast_turns_hold() {
             let truth = rotating(seed as usize % 4, 0.12 + 0.13 * (seed % 3) as f64 / 2.0);
             let seen = views(&truth, 400, seed, |_, r| 0.02 * (0.5 + r)).noisy(4e-4, 100 + seed);
             let seen = seen.with_outliers(share, 200 + seed);
-            let found = seen.run(&Noise::Sigma(4e-4), &MotionOptions { robust, ..MotionOptions::default() });
+            let found =
+                seen.run(&Noise::StandardDeviation(4e-4), &MotionOptions { robust, ..MotionOptions::default() });
             if found.status == Status::Ok {
                 ok += 1;
                 held += u32::from(mahalanobis(&found, &truth) < ELLIPSOID);
@@ -154,7 +155,7 @@ fn points_on_a_line_are_given_no_invented_turn() {
             let line = |k: u64| [1.2 * CounterRng::new(400 + seed).uniform(k) - 0.6, 0.2];
             let seen = views_at(&truth, 300, seed, line, |_, r| 0.1 * (0.5 + r)).noisy(5e-4, 100 + seed);
             let options = MotionOptions { initial: start.then_some(truth), ..MotionOptions::default() };
-            let found = seen.run(&Noise::Sigma(5e-4), &options);
+            let found = seen.run(&Noise::StandardDeviation(5e-4), &options);
             if found.status == Status::Ok {
                 ok += 1;
                 let error = found.motion.angle_to(&truth).to_degrees();
@@ -178,7 +179,7 @@ fn smoothed_weights_are_as_good_on_a_curve() {
             [0.5 * cos, 0.5 * sin]
         };
         let seen = views_at(&truth, 196, seed, circle, |_, r| 0.1 * (0.5 + r)).noisy(3e-3, 100 + seed);
-        let found = seen.run(&Noise::Sigma(3e-3), &MotionOptions::default());
+        let found = seen.run(&Noise::StandardDeviation(3e-3), &MotionOptions::default());
         held += u32::from(mahalanobis(&found, &truth) < ELLIPSOID);
         smoothed += found.motion.angle_to(&truth).powi(2);
         likelihood += found.likelihood.motion.angle_to(&truth).powi(2);
@@ -195,7 +196,7 @@ fn fast_turns_without_translation_are_told() {
                 let truth = rotating(seed as usize % 4, turn);
                 let seen =
                     views(&truth, 300, seed, |_, _| 0.0).noisy(1e-4, 100 + seed).with_outliers(share, 200 + seed);
-                for noise in [Noise::Sigma(1e-4), Noise::Unknown] {
+                for noise in [Noise::StandardDeviation(1e-4), Noise::Unknown] {
                     let found = seen.run(&noise, &MotionOptions { robust, ..MotionOptions::default() });
                     assert_eq!(found.status, Status::RotationOnly, "{turn} {robust} {seed} {noise:?}");
                     let error = (found.motion.w() - truth.w()).norm();
@@ -212,7 +213,7 @@ fn a_plane_has_two_exact_motions() {
     for (turn, scale) in [(0.02, 0.02), (0.25, 0.02), (0.25, 0.15)] {
         let truth = rotating(0, turn);
         let seen = views(&truth, 300, 3, |[x, y], _| scale * (0.9 + 0.3 * x - 0.2 * y));
-        let found = seen.run(&Noise::Sigma(1e-7), &MotionOptions::default());
+        let found = seen.run(&Noise::StandardDeviation(1e-7), &MotionOptions::default());
         assert_eq!(found.status, Status::Ambiguous);
         let both = [found.motion, found.alternatives[0].motion];
         assert!(both.iter().any(|motion| off(motion, &truth) < 1e-8), "{turn} {scale}");

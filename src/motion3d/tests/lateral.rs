@@ -9,10 +9,10 @@ fn depths(n: usize) -> Vec<f64> {
     (0..n).map(|k| 0.5 + k as f64 / (n - 1) as f64).collect()
 }
 
-fn flow(depths: &[f64], angle: f64, sigma: f64, seed: u64) -> Vec<[f64; 2]> {
+fn flow(depths: &[f64], angle: f64, noise_std: f64, seed: u64) -> Vec<[f64; 2]> {
     let rng = CounterRng::new(seed);
     let (y, x) = angle.sin_cos();
-    let noise = |k: usize, j: u64| sigma * rng.normal(2 * k as u64 + j);
+    let noise = |k: usize, j: u64| noise_std * rng.normal(2 * k as u64 + j);
     depths.iter().enumerate().map(|(k, nu)| [nu * x + noise(k, 0), nu * y + noise(k, 1)]).collect()
 }
 
@@ -23,11 +23,11 @@ fn between(a: f64, b: f64) -> f64 {
 
 /// Mean squared errors over many trials: of maximum likelihood, of weights of 1, of shrunk weights; and the
 /// mean variances reported.
-fn squares(n: usize, sigma: f64, told: Option<f64>, trials: u64) -> ([f64; 3], [f64; 3]) {
+fn squares(n: usize, noise_std: f64, told: Option<f64>, trials: u64) -> ([f64; 3], [f64; 3]) {
     let (nu, angle) = (depths(n), 2.2);
     let (mut errors, mut variances) = ([0.0; 3], [0.0; 3]);
     for seed in 0..trials {
-        let flow = flow(&nu, angle, sigma, seed);
+        let flow = flow(&nu, angle, noise_std, seed);
         for (k, weights) in ALL.into_iter().enumerate() {
             let found = estimate_lateral(&flow, told, weights).unwrap();
             errors[k] += between(found.angle, angle).powi(2) / trials as f64;
@@ -40,16 +40,21 @@ fn squares(n: usize, sigma: f64, told: Option<f64>, trials: u64) -> ([f64; 3], [
 #[test]
 fn variances_are_those_of_theory() {
     // The mean of 3000 squares scatters by 2.6 %.
-    for sigma in [0.1, 0.30369, 0.6, 1.0] {
-        let bound = lateral_bound(&depths(1000), sigma).unwrap();
-        for told in [Some(sigma), None] {
-            let (errors, variances) = squares(1000, sigma, told, 3000);
+    for noise_std in [0.1, 0.30369, 0.6, 1.0] {
+        let bound = lateral_bound(&depths(1000), noise_std).unwrap();
+        for told in [Some(noise_std), None] {
+            let (errors, variances) = squares(1000, noise_std, told, 3000);
             for (k, want) in [bound.likelihood, bound.ones, bound.shrunk].into_iter().enumerate() {
-                assert!((errors[k] / want - 1.0).abs() < 0.06, "{sigma} {:?}: {} is not {want}", ALL[k], errors[k]);
-                assert!((variances[k] / want - 1.0).abs() < 0.06, "{sigma} {:?}: {}, not {want}", ALL[k], variances[k]);
+                assert!((errors[k] / want - 1.0).abs() < 0.06, "{noise_std} {:?}: {} is not {want}", ALL[k], errors[k]);
+                assert!(
+                    (variances[k] / want - 1.0).abs() < 0.06,
+                    "{noise_std} {:?}: {}, not {want}",
+                    ALL[k],
+                    variances[k]
+                );
             }
             // On the same noise.
-            assert!(errors[2] < 1.01 * errors[0].min(errors[1]), "{sigma}: {errors:?}");
+            assert!(errors[2] < 1.01 * errors[0].min(errors[1]), "{noise_std}: {errors:?}");
         }
     }
 }
@@ -85,8 +90,8 @@ fn every_direction_comes_with_its_sign_and_depths() {
         let mut exact = flow(&nu, angle, 0.0, 1);
         exact.push([f64::NAN, 1.0]);
         for weights in ALL {
-            for sigma in [Some(1e-6), None] {
-                let found = estimate_lateral(&exact, sigma, weights).unwrap();
+            for noise_std in [Some(1e-6), None] {
+                let found = estimate_lateral(&exact, noise_std, weights).unwrap();
                 assert!(between(found.angle, angle).abs() < 1e-12, "{weights:?} {angle}: {}", found.angle);
                 assert!(found.variance < 1e-12 && found.bound <= found.variance);
                 assert!(found.inverse_depth[40].is_nan());
@@ -119,7 +124,7 @@ fn estimates_solve_their_equations() {
     let scatter = along.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 59.0 - 0.16;
     let weight = |m: f64| mean + (scatter / (scatter + 0.16)) * (m - mean);
     assert!(along.iter().zip(&across).map(|(m, e)| weight(*m) * e).sum::<f64>().abs() < 1e-6);
-    assert_eq!(shrunk.sigma, 0.4);
+    assert_eq!(shrunk.noise_std, 0.4);
     assert!(
         (found(LateralWeights::Ones).variance - 0.16 / (60.0 * (mean * mean - 0.16 / 60.0))).abs()
             < 0.1 * shrunk.variance
@@ -141,15 +146,15 @@ fn noise_alone_is_told_by_its_variance() {
 
 #[test]
 fn mistakes_are_told_by_name() {
-    let refused = |flow: &[[f64; 2]], sigma, word: &str| {
+    let refused = |flow: &[[f64; 2]], noise_std, word: &str| {
         for weights in ALL {
-            let error = estimate_lateral(flow, sigma, weights).unwrap_err().to_string();
+            let error = estimate_lateral(flow, noise_std, weights).unwrap_err().to_string();
             assert!(error.starts_with(word), "{error}");
         }
     };
-    for sigma in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-300, 1e300] {
-        refused(&[[1.0, 0.0]; 9], Some(sigma), "sigma: ");
-        assert!(lateral_bound(&[1.0], sigma).unwrap_err().to_string().starts_with("sigma: "));
+    for noise_std in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-300, 1e300] {
+        refused(&[[1.0, 0.0]; 9], Some(noise_std), "noise_std: ");
+        assert!(lateral_bound(&[1.0], noise_std).unwrap_err().to_string().starts_with("noise_std: "));
     }
     refused(&[], Some(0.1), "flow: ");
     refused(&[[1.0, 0.0]], None, "flow: ");

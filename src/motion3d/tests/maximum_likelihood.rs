@@ -36,10 +36,10 @@ fn maximum_likelihood_tells_how_far_it_may_be() {
         (Motion::new([0.05, -0.03, 1.0], W), 300, 0.05, &|x, y, _| smooth(x, y)),
         (oblique(), 500, 0.1, &|_, _, r| 0.5 + r),
     ];
-    for (case, (motion, n, sigma, depth)) in cases.into_iter().enumerate() {
+    for (case, (motion, n, noise_std, depth)) in cases.into_iter().enumerate() {
         let (mut told, mut by_theory) = (Held::default(), Held::default());
         for seed in 0..100 {
-            let scene = Scene::new(motion, n, 0.6, sigma, seed, depth);
+            let scene = Scene::new(motion, n, 0.6, noise_std, seed, depth);
             let found = scene.run(&options);
             if matches!(found.status, Status::Ok | Status::LowSnr) {
                 let theory = MotionEstimate {

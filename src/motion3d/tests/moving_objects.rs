@@ -20,7 +20,7 @@ fn a_robust_search_tells_what_else_many_points_obey() {
         for k in 0..290 {
             scene.flow[k] = other.flow[k];
         }
-        let found = estimate_motion(&scene.flow(), &Noise::Sigma(0.01), &options()).unwrap();
+        let found = estimate_motion(&scene.flow(), &Noise::StandardDeviation(0.01), &options()).unwrap();
         assert_eq!(found.status, Status::Ambiguous, "{seed}");
         for truth in [ahead, aside] {
             let both = found.alternatives.iter().map(|other| other.motion).chain([found.motion]);
@@ -34,7 +34,7 @@ fn a_robust_search_tells_what_else_many_points_obey() {
         for k in (0..600).filter(|&k| scene.points[k][0] > 0.3) {
             scene.flow[k] = truck.flow[k];
         }
-        let found = estimate_motion(&scene.flow(), &Noise::Sigma(0.01), &options()).unwrap();
+        let found = estimate_motion(&scene.flow(), &Noise::StandardDeviation(0.01), &options()).unwrap();
         assert!(found.motion.angle_to(&ahead).to_degrees() < 2.0, "{seed}: {:?}", found.motion);
     }
 }
@@ -59,7 +59,8 @@ fn a_slow_mover_is_found_or_told() {
             }
             scene
         };
-        let run = |scene: &Scene| estimate_motion(&scene.flow(), &Noise::Sigma(0.0006), &options()).unwrap();
+        let run =
+            |scene: &Scene| estimate_motion(&scene.flow(), &Noise::StandardDeviation(0.0006), &options()).unwrap();
         let found = run(&scene(true));
         silent += u32::from(found.status == Status::Ok && mahalanobis(&found, &camera) > 45.0);
         trusted += u32::from(run(&scene(false)).status == Status::Ok);
@@ -83,7 +84,7 @@ fn points_among_rejected_ones_do_not_pull_the_motion() {
         for &k in &movers {
             scene.flow[k] = moving.flow[k];
         }
-        let found = estimate_motion(&scene.flow(), &Noise::Sigma(0.0006), &options()).unwrap();
+        let found = estimate_motion(&scene.flow(), &Noise::StandardDeviation(0.0006), &options()).unwrap();
         if found.status == Status::Ok {
             held.count(&found, &camera);
             wrong += (0..1000).filter(|k| found.inliers[*k] == movers.contains(k)).count();
@@ -100,8 +101,8 @@ fn points_among_rejected_ones_do_not_pull_the_motion() {
 /// but those of a part pull another way, and two motions explain the points better.
 #[test]
 fn what_a_thing_and_the_scene_obey_together_is_not_trusted() {
-    let sigma = 1e-3;
-    for noise in [Noise::Sigma(sigma), Noise::Unknown, Noise::Sigma(0.5 * sigma)] {
+    let noise_std = 1e-3;
+    for noise in [Noise::StandardDeviation(noise_std), Noise::Unknown, Noise::StandardDeviation(0.5 * noise_std)] {
         let (mut trusted, mut wrong) = (0, 0);
         for seed in 0..60 {
             let rng = CounterRng::new(seed).stream(7);
@@ -109,8 +110,8 @@ fn what_a_thing_and_the_scene_obey_together_is_not_trusted() {
             let w = normal(1).map(|value: f64| 0.01 * value);
             let (camera, by_itself) = (Motion::new(normal(0), w), normal(2).map(|value: f64| 0.005 * value));
             let moving = Motion::new(normal(3), std::array::from_fn(|i| w[i] + by_itself[i]));
-            let mut scene = Scene::new(camera, 600, 0.45, sigma, seed, |x, y, _| 0.01 * smooth(x, y));
-            let thing = Scene::new(moving, 600, 0.45, sigma, seed, |_, _, _| 0.012);
+            let mut scene = Scene::new(camera, 600, 0.45, noise_std, seed, |x, y, _| 0.01 * smooth(x, y));
+            let thing = Scene::new(moving, 600, 0.45, noise_std, seed, |_, _, _| 0.012);
             let middle = [0.2 * rng.normal(50), 0.2 * rng.normal(51)];
             let away = |k: usize| (scene.points[k][0] - middle[0]).hypot(scene.points[k][1] - middle[1]);
             let mut nearest: Vec<usize> = (0..600).collect();

@@ -7,10 +7,10 @@ use crate::motion3d::*;
 type Depth<'a> = &'a dyn Fn(f64, f64, f64) -> f64;
 
 /// How many 95 % ellipsoids of estimates with the status `ok` hold the truth.
-fn held(motion: Motion, (h, n, sigma): (f64, usize, f64), depth: Depth<'_>, trials: u64) -> Held {
+fn held(motion: Motion, (h, n, noise_std): (f64, usize, f64), depth: Depth<'_>, trials: u64) -> Held {
     let mut held = Held::default();
     for seed in 0..trials {
-        let scene = Scene::new(motion, n, h, sigma, seed, depth);
+        let scene = Scene::new(motion, n, h, noise_std, seed, depth);
         let found = scene.run(&MotionOptions::default());
         if found.status == Status::Ok {
             held.count(&found, &motion);
@@ -58,8 +58,8 @@ fn into_a_narrow_picture(seed: u64) -> Scene {
     let h = 0.05 + 0.15 * rng.uniform(0);
     let [x, y] = [1, 2].map(|k| 3.0 * h * (rng.uniform(k) - 0.5));
     let motion = Motion::new([x, y, 1.0], [3, 4, 5].map(|k| 0.02 * (rng.uniform(k) - 0.5)));
-    let sigma = h * 0.001 * (3.4 * rng.uniform(6)).exp();
-    Scene::new(motion, 200, h, sigma, seed, |x, y, _| smooth(x, y))
+    let noise_std = h * 0.001 * (3.4 * rng.uniform(6)).exp();
+    Scene::new(motion, 200, h, noise_std, seed, |x, y, _| smooth(x, y))
 }
 
 #[test]
@@ -113,7 +113,7 @@ fn residuals_that_the_told_noise_does_not_explain_widen_the_covariance() {
     for seed in 0..150 {
         let mut scene = Scene::oblique(200, 0.03, seed);
         let honest = scene.run(&MotionOptions::default());
-        scene.sigma = 0.01;
+        scene.noise_std = 0.01;
         let found = scene.run(&MotionOptions::default());
         held.count(&found, &scene.motion);
         factor += found.direction_std / honest.direction_std / 150.0;

@@ -9,7 +9,7 @@ fn counts(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {
     let (mut confident, mut wrong) = (0, 0);
     for seed in 0..trials {
         let scene = scene(7000 + seed);
-        let found = estimate_motion(&scene.flow(), &Noise::Sigma(scene.sigma), &options).unwrap();
+        let found = estimate_motion(&scene.flow(), &Noise::StandardDeviation(scene.noise_std), &options).unwrap();
         let error = found.motion.angle_to(&scene.motion).to_degrees();
         let ok = found.status == Status::Ok;
         confident += u32::from(ok);
@@ -21,9 +21,9 @@ fn counts(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {
 #[test]
 fn a_ground_in_large_noise_is_not_told_wrong_as_ok() {
     let side = Motion::new([1.0, 0.3, 0.2], [0.0, 0.02, 0.0]);
-    for (motion, h, sigma) in [(side, 0.6, 0.2), (oblique(), 0.4, 0.168), (oblique(), 0.4, 0.105)] {
-        let (_, wrong) = counts(100, |seed| Scene::new(motion, 500, h, sigma, seed, |_, y, _| ground(y)));
-        assert!(wrong <= 1, "{motion:?} {sigma}: {wrong}");
+    for (motion, h, noise_std) in [(side, 0.6, 0.2), (oblique(), 0.4, 0.168), (oblique(), 0.4, 0.105)] {
+        let (_, wrong) = counts(100, |seed| Scene::new(motion, 500, h, noise_std, seed, |_, y, _| ground(y)));
+        assert!(wrong <= 1, "{motion:?} {noise_std}: {wrong}");
     }
 }
 
@@ -32,9 +32,9 @@ fn a_ground_in_large_noise_is_not_told_wrong_as_ok() {
 #[test]
 fn a_ground_ahead_in_noise_as_large_as_its_flow_is_not_told_wrong_as_ok() {
     let ahead = Motion::new([0.06, -0.05, 1.0], [0.02, -0.03, 0.01]);
-    for (n, sigma) in [(1000, 0.2), (1000, 0.3), (6000, 0.2)] {
-        let (_, wrong) = counts(30, |seed| Scene::new(ahead, n, 0.5, sigma, seed, |_, y, _| ground(y)));
-        assert!(wrong <= 2, "{n} {sigma}: {wrong}");
+    for (n, noise_std) in [(1000, 0.2), (1000, 0.3), (6000, 0.2)] {
+        let (_, wrong) = counts(30, |seed| Scene::new(ahead, n, 0.5, noise_std, seed, |_, y, _| ground(y)));
+        assert!(wrong <= 2, "{n} {noise_std}: {wrong}");
     }
     let (confident, wrong) = counts(30, |seed| Scene::new(ahead, 1000, 0.5, 0.1, seed, |_, y, _| ground(y)));
     assert!(confident >= 15 && wrong == 0, "{confident} {wrong}");

@@ -34,7 +34,7 @@ fn outliers_that_fit_by_chance_are_in_the_covariance() {
         let (mut sure, mut inside) = (0, 0);
         for seed in 0..60 {
             let scene = among_outliers(outliers, noise, seed);
-            let found = estimate_motion(&scene.flow(), &Noise::Sigma(scene.sigma), &options).unwrap();
+            let found = estimate_motion(&scene.flow(), &Noise::StandardDeviation(scene.noise_std), &options).unwrap();
             if found.status == Status::Ok {
                 sure += 1;
                 inside += u32::from(mahalanobis(&found, &scene.motion) < 11.07);
@@ -57,7 +57,8 @@ fn few_near_points_before_a_far_background_stay() {
             for (robustly, sum) in [(false, &mut plain), (true, &mut robust)] {
                 let options =
                     MotionOptions { placement: Placement::Start, robust: robustly, ..MotionOptions::default() };
-                let found = estimate_motion(&scene.flow(), &Noise::Sigma(scene.sigma), &options).unwrap();
+                let found =
+                    estimate_motion(&scene.flow(), &Noise::StandardDeviation(scene.noise_std), &options).unwrap();
                 *sum += found.motion.angle_to(&motion).to_degrees().powi(2);
             }
         }

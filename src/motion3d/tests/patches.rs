@@ -5,7 +5,7 @@ use crate::math::random::CounterRng;
 use crate::motion3d::*;
 
 /// `n` patches in `[-h, h]^2` on the plane at distance 1, seen with a focal length of 500 px: windows of `2 r
-/// + 1` px, noise of `sigma` px, 3 px of flow in the mean.
+/// + 1` px, noise of `noise_std` px, 3 px of flow in the mean.
 struct Made {
     points: Vec<[f64; 2]>,
     motion: Vec<[f64; 6]>,
@@ -13,7 +13,7 @@ struct Made {
 }
 
 impl Made {
-    fn new(truth: &Motion, n: u64, h: f64, r: f64, sigma: f64, seed: u64) -> Self {
+    fn new(truth: &Motion, n: u64, h: f64, r: f64, noise_std: f64, seed: u64) -> Self {
         let rng = CounterRng::new(seed);
         let place = |k: u64| [0, 1].map(|j| h * (2.0 * rng.uniform(2 * k + j) - 1.0));
         let depth = |k: u64| 0.5 + rng.stream(1).uniform(k);
@@ -24,7 +24,7 @@ impl Made {
         };
         let scale = 3.0 / 500.0 * n as f64 / (0..n).map(length).sum::<f64>();
         let deviations: [f64; 6] =
-            std::array::from_fn(|i| if i < 2 { sigma / 500.0 } else { 3.0f64.sqrt() * sigma / r });
+            std::array::from_fn(|i| if i < 2 { noise_std / 500.0 } else { 3.0f64.sqrt() * noise_std / r });
         let mut out = Self { points: vec![], motion: vec![], covariances: vec![] };
         for k in 0..n {
             let nu = scale * depth(k);
@@ -48,10 +48,10 @@ impl Made {
 
 /// How many estimates are confident, how many of those have the truth far outside of their ellipsoid, and how
 /// many go the opposite way.
-fn silently_wrong(truth: &Motion, n: u64, h: f64, r: f64, sigma: f64, method: Method) -> (u32, u32, u32) {
+fn silently_wrong(truth: &Motion, n: u64, h: f64, r: f64, noise_std: f64, method: Method) -> (u32, u32, u32) {
     let (mut confident, mut wrong, mut opposite) = (0, 0, 0);
     for seed in 0..60 {
-        let found = Made::new(truth, n, h, r, sigma, seed).estimate(method);
+        let found = Made::new(truth, n, h, r, noise_std, seed).estimate(method);
         if found.status == Status::Ok {
             let turned = found.motion.angle_to(truth).to_degrees() > 90.0;
             confident += 1;
@@ -68,11 +68,11 @@ fn patches_are_not_trusted_where_they_do_not_tell() {
     let oblique = Motion::new([0.6, 0.2, 0.75], [0.002, -0.003, 0.001]);
     let (mut confident, mut wrong) = (0, 0);
     for truth in [lateral, oblique] {
-        for (n, h, r, sigma) in
+        for (n, h, r, noise_std) in
             [(30, 0.2, 60.0, 0.15), (10, 0.2, 60.0, 0.05), (20, 0.4, 30.0, 0.1), (100, 0.2, 30.0, 0.15)]
         {
             for method in [Method::Auto, Method::MaximumLikelihood] {
-                let (sure, off, opposite) = silently_wrong(&truth, n, h, r, sigma, method);
+                let (sure, off, opposite) = silently_wrong(&truth, n, h, r, noise_std, method);
                 assert!(opposite == 0 && off <= 3, "{truth:?} {n} {h} {r} {method:?}: {opposite}, {off} of {sure}");
                 confident += sure;
                 wrong += off;

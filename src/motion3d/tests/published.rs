@@ -18,8 +18,13 @@ fn grid() -> (Vec<[f64; 2]>, Vec<f64>) {
 fn bound_of(motion: &Motion) -> MotionBound {
     let (points, depths) = grid();
     let flow = vec![[0.0; 2]; points.len()];
-    motion_bound(&Flow::Plane { points: &points, flow: &flow, camera: None }, &Noise::Sigma(0.1), motion, &depths)
-        .unwrap()
+    motion_bound(
+        &Flow::Plane { points: &points, flow: &flow, camera: None },
+        &Noise::StandardDeviation(0.1),
+        motion,
+        &depths,
+    )
+    .unwrap()
 }
 
 #[test]
@@ -74,7 +79,8 @@ fn one_unknown_has_its_closed_forms() {
     let at = vec![[0.0; 2]; 101];
     let flow = Flow::Plane { points: &at, flow: &at, camera: None };
     let observations =
-        crate::motion3d::model::whitening::Whitening::new(&flow, &Noise::Sigma(0.3), Placement::Start).whitened();
+        crate::motion3d::model::whitening::Whitening::new(&flow, &Noise::StandardDeviation(0.3), Placement::Start)
+            .whitened();
     let motion = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
     let tangent = crate::motion3d::model::rows::tangents(&motion.u());
     let mut nu = depths.clone();
@@ -93,11 +99,16 @@ fn points_that_determine_nothing_have_no_bound() {
     let (points, flow) = (vec![[0.1, 0.2]; 8], vec![[0.0; 2]; 8]);
     let points = Flow::Plane { points: &points, flow: &flow, camera: None };
     let motion = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
-    let error = motion_bound(&points, &Noise::Sigma(0.1), &motion, &[1.0; 8]).unwrap_err();
+    let error = motion_bound(&points, &Noise::StandardDeviation(0.1), &motion, &[1.0; 8]).unwrap_err();
     assert!(matches!(error, crate::Error::NotObservable(_)), "{error}");
-    assert!(motion_bound(&points, &Noise::Unknown, &motion, &[1.0; 8]).unwrap_err().to_string().starts_with("sigma: "));
     assert!(
-        motion_bound(&points, &Noise::Sigma(0.1), &motion, &[1.0]).unwrap_err().to_string().starts_with("inv_depth: ")
+        motion_bound(&points, &Noise::Unknown, &motion, &[1.0; 8]).unwrap_err().to_string().starts_with("noise_std: ")
+    );
+    assert!(
+        motion_bound(&points, &Noise::StandardDeviation(0.1), &motion, &[1.0])
+            .unwrap_err()
+            .to_string()
+            .starts_with("inv_depth: ")
     );
 }
 
@@ -108,7 +119,7 @@ fn too_few_places_have_no_bound_whatever_rounding_makes_of_them() {
         let flow = vec![[0.0; 2]; points.len()];
         let depths: Vec<f64> = (0..points.len()).map(|k| 0.5 + 0.37 * (k % 3) as f64).collect();
         let points = Flow::Plane { points, flow: &flow, camera: None };
-        motion_bound(&points, &Noise::Sigma(0.01), &motion, &depths)
+        motion_bound(&points, &Noise::StandardDeviation(0.01), &motion, &depths)
     };
     let rng = crate::math::random::CounterRng::new(5);
     let places = |n: usize, trial: u64, half: f64| -> Vec<[f64; 2]> {

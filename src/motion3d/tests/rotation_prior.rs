@@ -30,7 +30,7 @@ fn flow_that_speaks_against_a_known_rotation_is_heard() {
         let run = |scene: &Scene, rotation_prior| {
             let options =
                 MotionOptions { method, robust, rotation_prior, placement: Placement::Start, ..Default::default() };
-            let noise = if known { Noise::Sigma(scene.sigma) } else { Noise::Unknown };
+            let noise = if known { Noise::StandardDeviation(scene.noise_std) } else { Noise::Unknown };
             estimate_motion(&scene.flow(), &noise, &options).unwrap()
         };
         let (mut wide, mut nearer) = (Held::default(), 0);
@@ -70,7 +70,7 @@ fn a_wrong_rotation_hides_no_translation_in_unknown_noise() {
 /// flow less.
 #[test]
 fn a_wrong_rotation_that_is_told_surely_does_not_hide_itself() {
-    for noise in [Noise::Sigma(0.01), Noise::Unknown] {
+    for noise in [Noise::StandardDeviation(0.01), Noise::Unknown] {
         for deviation in [1e-3, 1e-4, 1e-5] {
             for seed in 0..10 {
                 let (scene, mut prior) = estimate_with_prior(seed, 15.0);

@@ -33,12 +33,19 @@ pub(crate) struct Scene {
     pub inverse_depth: Vec<f64>,
     pub flow: Vec<[f64; 2]>,
     /// Standard deviation of the noise; that of exact flow is said to be 1e-6.
-    pub sigma: f64,
+    pub noise_std: f64,
 }
 
 impl Scene {
     /// `n` points in `[-h, h]^2` whose inverse depth is a function of `(x, y) / h` and a random number.
-    pub fn new(motion: Motion, n: usize, h: f64, sigma: f64, seed: u64, depth: impl Fn(f64, f64, f64) -> f64) -> Self {
+    pub fn new(
+        motion: Motion,
+        n: usize,
+        h: f64,
+        noise_std: f64,
+        seed: u64,
+        depth: impl Fn(f64, f64, f64) -> f64,
+    ) -> Self {
         let rng = CounterRng::new(seed);
         let at = |k: usize, j: u64| 2.0 * rng.uniform(3 * k as u64 + j) - 1.0;
         let points: Vec<[f64; 2]> = (0..n).map(|k| [h * at(k, 0), h * at(k, 1)]).collect();
@@ -48,15 +55,15 @@ impl Scene {
         let flow = (0..n)
             .map(|k| {
                 let exact = motion.plane_flow(points[k], inverse_depth[k]);
-                [0, 1].map(|j| exact[j] + sigma * noise.normal(2 * k as u64 + j as u64))
+                [0, 1].map(|j| exact[j] + noise_std * noise.normal(2 * k as u64 + j as u64))
             })
             .collect();
-        Self { motion, points, inverse_depth, flow, sigma: if sigma > 0.0 { sigma } else { 1e-6 } }
+        Self { motion, points, inverse_depth, flow, noise_std: if noise_std > 0.0 { noise_std } else { 1e-6 } }
     }
 
     /// Random depths from 0.5 to 1.5, the oblique motion.
-    pub fn oblique(n: usize, sigma: f64, seed: u64) -> Self {
-        Self::new(Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]), n, 0.6, sigma, seed, |_, _, r| 0.5 + r)
+    pub fn oblique(n: usize, noise_std: f64, seed: u64) -> Self {
+        Self::new(Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]), n, 0.6, noise_std, seed, |_, _, r| 0.5 + r)
     }
 
     pub fn flow(&self) -> Flow<'_> {
@@ -66,11 +73,11 @@ impl Scene {
     /// Estimates with its noise known, flow being instantaneous.
     pub fn run(&self, options: &MotionOptions) -> MotionEstimate {
         let options = MotionOptions { placement: Placement::Start, ..options.clone() };
-        estimate_motion(&self.flow(), &Noise::Sigma(self.sigma), &options).unwrap()
+        estimate_motion(&self.flow(), &Noise::StandardDeviation(self.noise_std), &options).unwrap()
     }
 
     pub fn observations(&self) -> Observations {
-        Whitening::new(&self.flow(), &Noise::Sigma(self.sigma), Placement::Start).whitened()
+        Whitening::new(&self.flow(), &Noise::StandardDeviation(self.noise_std), Placement::Start).whitened()
     }
 }
 

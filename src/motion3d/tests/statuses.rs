@@ -50,7 +50,7 @@ fn one_place_is_ill_conditioned_without_a_covariance() {
     let flow: Vec<[f64; 2]> = (0..60).map(|k| oblique().plane_flow(points[k], 0.5 + k as f64 / 60.0)).collect();
     let given = Flow::Plane { points: &points, flow: &flow, camera: None };
     let options = MotionOptions { placement: Placement::Start, ..MotionOptions::default() };
-    for noise in [Noise::Sigma(1e-6), Noise::Sigma(1e-3)] {
+    for noise in [Noise::StandardDeviation(1e-6), Noise::StandardDeviation(1e-3)] {
         let found = estimate_motion(&given, &noise, &options).unwrap();
         assert_eq!(found.status, Status::IllConditioned, "{noise:?}");
         assert!(found.direction_std.is_nan() && found.covariance[0][0].is_nan(), "{noise:?}");

@@ -14,7 +14,7 @@ type Any<'py> = Bound<'py, PyAny>;
 pub struct Layout<'py> {
     #[pyo3(item("K"))]
     camera: Option<Any<'py>>,
-    sigma: Option<f64>,
+    noise_std: Option<f64>,
     cov: Option<Any<'py>>,
     projection: String,
     /// Whether six numbers a patch are given.
@@ -78,7 +78,7 @@ enum Screen {
 pub struct Given {
     screen: Screen,
     camera: Option<Intrinsics>,
-    sigma: Option<f64>,
+    noise_std: Option<f64>,
     covariances: Option<Vec<f64>>,
 }
 
@@ -100,7 +100,7 @@ impl Given {
         };
         let count = shape.first().copied().unwrap_or(0);
         let covariances = covariances(layout, count, if spherical { 3 } else { 2 })?;
-        Ok(Self { screen, camera, sigma: layout.sigma, covariances })
+        Ok(Self { screen, camera, noise_std: layout.noise_std, covariances })
     }
 
     /// As the core takes it.
@@ -113,9 +113,9 @@ impl Given {
 
     /// As the core takes it.
     pub fn noise(&self) -> Noise<'_> {
-        match (&self.covariances, self.sigma) {
+        match (&self.covariances, self.noise_std) {
             (Some(values), _) => Noise::Covariances(values),
-            (None, Some(sigma)) => Noise::Sigma(sigma),
+            (None, Some(noise_std)) => Noise::StandardDeviation(noise_std),
             (None, None) => Noise::Unknown,
         }
     }
@@ -125,8 +125,8 @@ impl Given {
 fn covariances(layout: &Layout<'_>, count: usize, size: usize) -> PyResult<Option<Vec<f64>>> {
     let Some(given) = &layout.cov else { return Ok(None) };
     let (shape, values) = arrays::doubles("cov", given)?;
-    if layout.sigma.is_some() {
-        return Err(Error::argument("cov", "either sigma or cov", "both").into());
+    if layout.noise_std.is_some() {
+        return Err(Error::argument("cov", "either noise_std or cov", "both").into());
     }
     if shape != [count, size, size] {
         let expected = format!("shape ({count}, {size}, {size})");

@@ -17,13 +17,13 @@ pub struct PyLateral<'py> {
     angle: f64,
     variance: f64,
     crlb: f64,
-    sigma: f64,
+    noise_std: f64,
     inv_depth: Bound<'py, PyArrayDyn<f64>>,
 }
 
 /// A bound.
 #[derive(IntoPyObject)]
-pub struct ToldLateralBound {
+pub struct PyLateralBound {
     crlb: f64,
     ml_variance: f64,
     ones_variance: f64,
@@ -36,16 +36,16 @@ pub struct ToldLateralBound {
 pub fn motion3d_lateral<'py>(
     py: Python<'py>,
     flow: &Bound<'py, PyAny>,
-    sigma: Option<f64>,
+    noise_std: Option<f64>,
     weights: &str,
 ) -> PyResult<PyLateral<'py>> {
     let weights = word("weights", weights, &WEIGHTS)?;
     let (shape, values) = arrays::doubles("flow", flow)?;
     let flow: Vec<[f64; 2]> = rows("flow", &shape, &values)?;
-    let LateralEstimate { angle, variance, bound, sigma, inverse_depth } =
-        py.detach(|| estimate_lateral(&flow, sigma, weights))?;
+    let LateralEstimate { angle, variance, bound, noise_std, inverse_depth } =
+        py.detach(|| estimate_lateral(&flow, noise_std, weights))?;
     let inv_depth = arrays::owned(py, &[inverse_depth.len()], inverse_depth)?;
-    Ok(PyLateral { angle, variance, crlb: bound, sigma, inv_depth })
+    Ok(PyLateral { angle, variance, crlb: bound, noise_std, inv_depth })
 }
 
 #[pyfunction]
@@ -53,18 +53,13 @@ pub fn motion3d_lateral<'py>(
 pub fn motion3d_lateral_bound(
     py: Python<'_>,
     inverse_depth: &Bound<'_, PyAny>,
-    sigma: f64,
-) -> PyResult<ToldLateralBound> {
+    noise_std: f64,
+) -> PyResult<PyLateralBound> {
     let (shape, depths) = arrays::doubles("inv_depth", inverse_depth)?;
     if shape.len() != 1 {
         return Err(Error::argument("inv_depth", "shape (N,)", format!("shape {shape:?}")).into());
     }
-    let LateralBound { bound, likelihood, ones, shrunk, crossover } = py.detach(|| lateral_bound(&depths, sigma))?;
-    Ok(ToldLateralBound {
-        crlb: bound,
-        ml_variance: likelihood,
-        ones_variance: ones,
-        shrunk_variance: shrunk,
-        crossover,
-    })
+    let LateralBound { bound, likelihood, ones, shrunk, crossover } =
+        py.detach(|| lateral_bound(&depths, noise_std))?;
+    Ok(PyLateralBound { crlb: bound, ml_variance: likelihood, ones_variance: ones, shrunk_variance: shrunk, crossover })
 }

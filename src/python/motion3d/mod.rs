@@ -15,7 +15,7 @@ use crate::motion3d::{Motion, check_motion, estimate_motion, estimate_patch_moti
 use given::{Given, GivenPatches, Layout, rows, triple};
 use options::Options;
 use pyo3::prelude::*;
-use results::{ToldBound, ToldEstimate};
+use results::{PyBound, PyEstimate};
 
 #[pyfunction]
 #[pyo3(name = "_motion3d_estimate")]
@@ -25,16 +25,16 @@ pub fn motion3d_estimate<'py>(
     flow: &Bound<'py, PyAny>,
     layout: Layout<'py>,
     options: Options<'py>,
-) -> PyResult<ToldEstimate<'py>> {
+) -> PyResult<PyEstimate<'py>> {
     let options = options.core()?;
     if layout.six {
         let given = GivenPatches::new(points, Some(flow), &layout)?;
         let found = py.detach(|| estimate_patch_motion(&given.patches(), &options))?;
-        return ToldEstimate::new(py, found);
+        return PyEstimate::new(py, found);
     }
     let given = Given::new(points, Some(flow), &layout)?;
     let found = py.detach(|| estimate_motion(&given.flow(), &given.noise(), &options))?;
-    ToldEstimate::new(py, found)
+    PyEstimate::new(py, found)
 }
 
 #[pyfunction]
@@ -46,7 +46,7 @@ pub fn motion3d_bound<'py>(
     translation: &Bound<'py, PyAny>,
     rotation: &Bound<'py, PyAny>,
     layout: Layout<'py>,
-) -> PyResult<ToldBound<'py>> {
+) -> PyResult<PyBound<'py>> {
     let (translation, rotation) = (triple("translation", translation)?, triple("rotation", rotation)?);
     check_motion(&translation, &rotation)?;
     let motion = Motion::new(translation, rotation);
@@ -55,9 +55,9 @@ pub fn motion3d_bound<'py>(
         let given = GivenPatches::new(points, None, &layout)?;
         let surfaces: Vec<[f64; 3]> = rows("inv_depth", &shape, &depths)?;
         let bound = py.detach(|| patch_motion_bound(&given.patches(), &motion, &surfaces))?;
-        return ToldBound::new(py, &bound);
+        return PyBound::new(py, &bound);
     }
     let given = Given::new(points, None, &layout)?;
     let bound = py.detach(|| motion_bound(&given.flow(), &given.noise(), &motion, &depths))?;
-    ToldBound::new(py, &bound)
+    PyBound::new(py, &bound)
 }

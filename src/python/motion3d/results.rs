@@ -28,7 +28,7 @@ fn values(py: Python<'_>, each: Vec<f64>) -> PyResult<Array<'_>> {
 
 /// A motion with its covariance, or one of the other motions, which have none.
 #[derive(IntoPyObject)]
-struct ToldMotion<'py> {
+struct PyMotion<'py> {
     translation: Array<'py>,
     rotation: Array<'py>,
     cost: f64,
@@ -36,7 +36,7 @@ struct ToldMotion<'py> {
     tangent: Option<Array<'py>>,
 }
 
-impl<'py> ToldMotion<'py> {
+impl<'py> PyMotion<'py> {
     fn new(py: Python<'py>, motion: &Motion, cost: f64) -> PyResult<Self> {
         let (translation, rotation) = (vector(py, motion.translation)?, vector(py, motion.rotation)?);
         Ok(Self { translation, rotation, cost, covariance: None, tangent: None })
@@ -45,13 +45,13 @@ impl<'py> ToldMotion<'py> {
 
 /// What errors do that all flow has in common.
 #[derive(IntoPyObject)]
-struct ToldCommon<'py> {
+struct PyCommon<'py> {
     scale: f64,
     displacements: Array<'py>,
     motion: Array<'py>,
 }
 
-impl<'py> ToldCommon<'py> {
+impl<'py> PyCommon<'py> {
     fn new(py: Python<'py>, common: &CommonEffect) -> PyResult<Self> {
         let (displacements, motion) = (matrix(py, &common.displaced)?, matrix(py, &common.motion)?);
         Ok(Self { scale: common.scale, displacements, motion })
@@ -60,7 +60,7 @@ impl<'py> ToldCommon<'py> {
 
 /// An estimate.
 #[derive(IntoPyObject)]
-pub struct ToldEstimate<'py> {
+pub struct PyEstimate<'py> {
     translation: Array<'py>,
     rotation: Array<'py>,
     status: &'static str,
@@ -68,7 +68,7 @@ pub struct ToldEstimate<'py> {
     fell_back: bool,
     covariance: Array<'py>,
     tangent: Array<'py>,
-    common_errors: ToldCommon<'py>,
+    common_errors: PyCommon<'py>,
     crlb: Array<'py>,
     direction_std: f64,
     rotation_std: Array<'py>,
@@ -82,21 +82,21 @@ pub struct ToldEstimate<'py> {
     approach_rate: f64,
     approach_rate_std: f64,
     inliers: Bound<'py, PyArrayDyn<bool>>,
-    sigma: f64,
+    noise_std: f64,
     residuals: Array<'py>,
-    alternatives: Vec<ToldMotion<'py>>,
-    ml: ToldMotion<'py>,
+    alternatives: Vec<PyMotion<'py>>,
+    ml: PyMotion<'py>,
 }
 
-impl<'py> ToldEstimate<'py> {
+impl<'py> PyEstimate<'py> {
     pub fn new(py: Python<'py>, found: MotionEstimate) -> PyResult<Self> {
         let likelihood = &found.likelihood;
-        let ml = ToldMotion {
+        let ml = PyMotion {
             covariance: Some(matrix(py, &likelihood.covariance)?),
             tangent: Some(matrix(py, &likelihood.tangent)?),
-            ..ToldMotion::new(py, &likelihood.motion, likelihood.cost)?
+            ..PyMotion::new(py, &likelihood.motion, likelihood.cost)?
         };
-        let others = found.alternatives.iter().map(|other| ToldMotion::new(py, &other.motion, other.excess));
+        let others = found.alternatives.iter().map(|other| PyMotion::new(py, &other.motion, other.excess));
         Ok(Self {
             translation: vector(py, found.motion.translation)?,
             rotation: vector(py, found.motion.rotation)?,
@@ -105,14 +105,14 @@ impl<'py> ToldEstimate<'py> {
             fell_back: found.fell_back,
             covariance: matrix(py, &found.covariance)?,
             tangent: matrix(py, &found.tangent)?,
-            common_errors: ToldCommon::new(py, &found.common)?,
+            common_errors: PyCommon::new(py, &found.common)?,
             crlb: matrix(py, &found.bound)?,
             direction_std: found.direction_std,
             rotation_std: vector(py, found.rotation_std)?,
             surfaces: matrix(py, &found.surfaces)?,
             approach_rate: found.approach.0,
             approach_rate_std: found.approach.1,
-            sigma: found.sigma,
+            noise_std: found.noise_std,
             alternatives: others.collect::<PyResult<_>>()?,
             ml,
             inv_depth: values(py, found.inverse_depth)?,
@@ -128,7 +128,7 @@ impl<'py> ToldEstimate<'py> {
 
 /// A bound.
 #[derive(IntoPyObject)]
-pub struct ToldBound<'py> {
+pub struct PyBound<'py> {
     crlb: Array<'py>,
     ml_covariance: Array<'py>,
     ideal_covariance: Array<'py>,
@@ -136,7 +136,7 @@ pub struct ToldBound<'py> {
     direction_std: Array<'py>,
 }
 
-impl<'py> ToldBound<'py> {
+impl<'py> PyBound<'py> {
     pub fn new(py: Python<'py>, bound: &MotionBound) -> PyResult<Self> {
         Ok(Self {
             crlb: matrix(py, &bound.bound)?,
