@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 LARGER_IS_BETTER = ()
 FIRST = 20_000
 """Seed of the first scene; the kept tables use smaller ones."""
-SCENES = 100
+SCENES = 200
 """Scenes of each kind."""
 FAR_OFF, DEVIATIONS, ELLIPSOID = 15.0, 4.0, 11.070
 """Degrees and standard deviations beyond which an `ok` is wrong; 95 % of chi squared with five degrees."""

@@ -59,7 +59,7 @@ def controlled_scenes() -> Iterator[float]:
         case = controlled.Case(wavelength, speed, noise, seed)
         frames = [controlled.frame(case, t) for t in (-1.0, 0.0, 1.0)]
         flow, jacobian = controlled.truth(wavelength, speed, seed, 0.0, (-1.0, 1.0))
-        field = jacoflow.estimate(frames, method="windowed", rows="brightness", threads=1)
+        field = jacoflow.estimate(frames, method=jacoflow.Windowed(rows="brightness"), threads=1)
         inner = np.zeros(field.shape, bool)
         inner[MARGIN:-MARGIN, MARGIN:-MARGIN] = True
         yield excess(held(field, flow, jacobian, inner & field.valid))
