@@ -4,8 +4,6 @@
 
 mod score;
 mod select;
-#[cfg(test)]
-mod tests;
 
 pub use score::{CORNER_WINDOW, corner_score, corner_score_into};
 pub use select::{CornerOptions, select_corners};

@@ -9,7 +9,6 @@ use crate::types::Frame;
 /// Step 1, the default, turns a computed brightness into the integer that a camera would report, as in
 /// embodiment 2 of WO2010/098160. NaN and infinities stay as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct Quantiser {
     /// Distance between neighbouring levels, grey levels; default 1.
     pub step: f64,
@@ -59,26 +58,4 @@ pub(crate) fn are_rounded<T: Real>(frames: &[&Frame<T>]) -> bool {
     };
     let ranges: Option<Vec<_>> = frames.iter().map(range).collect();
     ranges.is_some_and(|ranges| ranges.iter().any(|(least, most)| most - least >= STEPS))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn values_go_down_to_the_level_below() {
-        let frame = Frame::new(4, 1, vec![1.9f32, -0.1, 3.0, f32::NAN]).unwrap();
-        let out = Quantiser::default().apply(&frame);
-        assert_eq!(&out.data()[..3], &[1.0, -1.0, 3.0]);
-        assert!(out.data()[3].is_nan());
-        let coarse = Quantiser::new(0.5).unwrap().apply(&frame);
-        assert_eq!(&coarse.data()[..3], &[1.5, -0.5, 3.0]);
-    }
-
-    #[test]
-    fn a_useless_step_is_refused_by_name() {
-        for step in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(Quantiser::new(step).unwrap_err().to_string().starts_with("quantise"));
-        }
-    }
 }

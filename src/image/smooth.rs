@@ -18,7 +18,6 @@ const MAX_RADIUS: f64 = 16_384.0;
 /// neighbourhood, so a NaN damages only the pixels whose kernel reaches it. Results are bit-identical for any
 /// number of threads.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct GaussianSmoother {
     /// Standard deviation of the Gaussian, px; 0 changes nothing.
     pub sigma: f64,
@@ -246,6 +245,3 @@ fn add_pair<V: Lanes, const N: usize>(sums: &mut [V; N], a: &[V::Scalar], b: &[V
         sums[i] = (V::load(&a[i * V::LANES..]) + V::load(&b[i * V::LANES..])).mul_add(weight, sums[i]);
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -255,6 +255,3 @@ fn zip_error(path: &Path, error: ZipError) -> Error {
         other => Error::format(path, format!("not a usable .npz archive: {other}")),
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -81,35 +81,3 @@ fn write_png(
         written.map_err(|e| Error::io(path, e.into()))
     })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::{Colour, read_image};
-    use super::*;
-    use crate::types::Frame;
-
-    #[test]
-    fn frames_and_pictures_come_back() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.png");
-        for frame in [
-            AnyFrame::U8(Frame::from_fn(5, 3, |x, y| (40 * x + y) as u8)),
-            AnyFrame::U16(Frame::from_fn(5, 3, |x, y| (9000 * x + y) as u16)),
-        ] {
-            write_frame_png(&path, &frame).unwrap();
-            assert_eq!(read_image(&path, Colour::Error).unwrap(), frame);
-        }
-        write_picture(&path, &Picture::filled(2, 1, [255, 0, 0])).unwrap();
-        assert_eq!(read_image(&path, Colour::Luminance).unwrap(), AnyFrame::U8(Frame::filled(2, 1, 76)));
-    }
-
-    #[test]
-    fn what_png_cannot_hold_is_refused() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.png");
-        let error = write_frame_png(&path, &AnyFrame::F32(Frame::filled(2, 2, 0.5))).unwrap_err();
-        assert!(matches!(error, Error::Type { argument: "frame", .. }));
-        assert!(write_picture(&path, &Picture::filled(0, 3, [0; 3])).is_err());
-        assert!(!path.exists());
-    }
-}

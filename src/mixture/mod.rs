@@ -36,8 +36,6 @@ mod posterior;
 mod prior;
 mod seeding;
 mod start;
-#[cfg(test)]
-mod tests;
 
 pub use dirichlet::{DirichletMixture, DirichletOptions, Inference, fit_dirichlet, fit_dirichlet_from};
 pub use fit::{Fit, Start, fit};

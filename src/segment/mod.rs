@@ -64,6 +64,3 @@ where
     forest.merge_small(&rejected, options.min_size);
     Ok(Labels::of_roots(width, height, |pixel| forest.root(pixel)))
 }
-
-#[cfg(test)]
-mod tests;

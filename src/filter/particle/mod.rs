@@ -38,8 +38,6 @@ mod predict;
 mod resampling;
 mod select;
 mod state;
-#[cfg(test)]
-mod tests;
 mod update;
 mod weights;
 

@@ -100,11 +100,4 @@ mod tests {
         assert_eq!(picture.pixel(58, 54), identity_colour(3), "the arc's middle");
         assert_eq!(picture.pixel(58, 40), GROUND);
     }
-
-    #[test]
-    fn long_films_and_nothing_at_all_are_drawn() {
-        let long: Vec<_> = (0..50_000).map(|step| node(step, 0, 1)).collect();
-        assert!(chart_picture(&long, &[]).width() < 20_000);
-        assert_eq!(chart_picture(&[], &[]).width(), 80);
-    }
 }

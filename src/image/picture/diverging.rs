@@ -16,7 +16,6 @@ pub fn symmetric_range<T: Real>(plane: &[T], at_percentile: f64) -> f64 {
 
 /// A diverging map with a range symmetric about zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct SignedMap {
     /// Value of the strongest red (and, negative, of the strongest blue); `None` (the default):
     /// [`symmetric_range`].
@@ -83,16 +82,5 @@ mod tests {
         assert_eq!([0, 1, 2, 3].map(|x| picture.pixel(x, 0)), [STOPS[2], STOPS[4], STOPS[0], [110; 3]]);
         assert_eq!(picture.pixel(4, 0), STOPS[4]);
         assert_eq!(colour(0.5), STOPS[3]);
-    }
-
-    #[test]
-    fn outliers_do_not_set_the_range() {
-        let mut plane = vec![0.01f32; 1000];
-        plane[3] = 1e6;
-        plane[4] = f32::NAN;
-        assert!((symmetric_range(&plane, 98.0) - 0.01).abs() < 1e-6);
-        assert_eq!(symmetric_range(&[0.0f32; 3], 98.0), 1.0);
-        assert_eq!(symmetric_range(&[f64::NAN; 3], 98.0), 1.0);
-        assert!(SignedMap::default().picture(&plane, 3, 3).is_err());
     }
 }

@@ -46,7 +46,6 @@ pub enum TrackColours {
 
 /// How a target is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
 pub struct TrackOverlay {
     /// What colours say; default: the status.
     pub colours: TrackColours,
@@ -183,23 +182,6 @@ mod tests {
     }
 
     #[test]
-    fn the_box_is_drawn_on_its_sides_and_turned_where_that_is_known() {
-        let upright = drawn(TrackOverlay::default(), &state(), &[]);
-        let green = status_colour(TrackStatus::Tracking);
-        for (x, y) in [(20, 18), (40, 22), (25, 15), (35, 25)] {
-            assert_eq!(upright.pixel(x, y), green, "{x} {y}");
-        }
-        let turned = TrackState { rotation: std::f64::consts::FRAC_PI_2, ..state() };
-        let picture = drawn(TrackOverlay::default(), &turned, &[]);
-        for (x, y) in [(25, 12), (35, 28), (30, 10), (30, 30)] {
-            assert_eq!(picture.pixel(x, y), green, "{x} {y}");
-        }
-        assert_eq!(picture.pixel(40, 22), GREY);
-        let blind = TrackState { rotation_observable: false, ..turned };
-        assert_eq!(drawn(TrackOverlay::default(), &blind, &[]), upright);
-    }
-
-    #[test]
     fn the_ellipse_has_the_axes_of_the_covariance() {
         let mut state = state();
         state.covariance[0][0][0] = 36.0 / CHI_SQUARED_95;
@@ -209,54 +191,5 @@ mod tests {
             assert_ne!(picture.pixel(x, y), GREY, "{x} {y}");
         }
         assert_eq!(picture.pixel(18, 20), GREY);
-    }
-
-    #[test]
-    fn path_and_status_have_their_colours() {
-        let lost = TrackState { status: TrackStatus::Lost, ..state() };
-        let path = [([5.0, 40.0], TrackStatus::Tracking), ([15.0, 40.0], TrackStatus::Coasting)];
-        let overlay = TrackOverlay::default();
-        let picture = drawn(overlay, &lost, &path);
-        assert_eq!(picture.pixel(10, 40), status_colour(TrackStatus::Coasting));
-        assert_eq!(picture.pixel(30, 15), status_colour(TrackStatus::Lost));
-    }
-
-    #[test]
-    fn targets_may_have_colours_of_their_own() {
-        let overlay = TrackOverlay { colours: TrackColours::Target, ..TrackOverlay::default() };
-        let colour = identity_colour(1);
-        let on_left_side = |picture: &Picture| (15..26).filter(|y| picture.pixel(20, *y) == colour).count();
-        assert_eq!(on_left_side(&drawn(overlay, &state(), &[])), 11);
-        let hidden = TrackState { status: TrackStatus::Coasting, ..state() };
-        let dashes = on_left_side(&drawn(overlay, &hidden, &[]));
-        assert!((4..9).contains(&dashes), "{dashes}");
-        let path = [([5.0, 40.0], TrackStatus::Tracking), ([15.0, 40.0], TrackStatus::Lost)];
-        for status in [TrackStatus::Out, TrackStatus::Lost] {
-            let gone = drawn(overlay, &TrackState { status, ..state() }, &path);
-            assert_eq!((gone.pixel(10, 40), on_left_side(&gone)), (colour, 0));
-        }
-    }
-
-    #[test]
-    fn an_enlarged_picture_has_everything_in_its_place() {
-        let overlay = TrackOverlay { enlargement: 3, ..TrackOverlay::default() };
-        let mut picture = Picture::filled(64, 48, GREY).enlarged(3);
-        overlay.draw(&mut picture, 12, &state(), &[]);
-        // Pixel 20 covers 60 to 62; its centre is 61.
-        assert_eq!(picture.pixel(61, 55), status_colour(TrackStatus::Tracking));
-    }
-
-    #[test]
-    fn what_is_not_known_is_left_out() {
-        let mut unknown = state();
-        unknown.bounds.x = f64::NAN;
-        unknown.position = [f64::NAN; 2];
-        unknown.covariance[0][0][0] = f64::NAN;
-        let overlay = TrackOverlay::default();
-        assert_eq!(drawn(overlay, &unknown, &[]), Picture::filled(64, 48, GREY));
-        unknown = state();
-        unknown.covariance[1][0][0] = f64::INFINITY;
-        unknown.bounds = TargetBox::about([1e300, -1e300], 3.0, 3.0);
-        drawn(overlay, &unknown, &[([f64::NAN; 2], TrackStatus::Out), ([1e300; 2], TrackStatus::Out)]);
     }
 }

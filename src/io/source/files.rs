@@ -176,6 +176,3 @@ impl<P: ChannelPolicy> FrameSource<P::Frame> for PagesSource<P> {
         format!("{} (TIFF)", self.path.display())
     }
 }
-
-#[cfg(test)]
-mod tests;

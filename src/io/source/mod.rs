@@ -26,7 +26,6 @@ use std::path::Path;
 /// How a source is opened: what to do with colour or grey, and the range of frames, `start`,
 /// `start + step`, ... below `stop`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
 pub struct OpenOptions {
     /// What [`open`] does with colour pictures; default: refuse.
     pub colour: Colour,
@@ -170,41 +169,4 @@ fn nothing_there(spec: &str) -> Error {
 pub(super) fn has_extension(path: impl AsRef<Path>, extensions: &[&str]) -> bool {
     let extension = path.as_ref().extension().and_then(|e| e.to_str());
     extension.is_some_and(|e| extensions.iter().any(|known| known.eq_ignore_ascii_case(e)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn specifications_find_their_kind() {
-        let folder = tempfile::tempdir().unwrap();
-        let inside = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
-        std::fs::write(inside("video.mp4"), b"x").unwrap();
-        std::fs::write(inside("odd[1].png"), b"x").unwrap();
-        for (spec, kind) in [
-            ("-".to_string(), Some("y4m")),
-            (inside("a.Y4M"), Some("y4m")),
-            (inside("a.npy"), Some("npy")),
-            (inside("a.txt"), Some("list")),
-            (folder.path().to_string_lossy().into_owned(), Some("files")),
-            (inside("a.TIF"), Some("files")),
-            (inside("odd[1].png"), Some("files")),
-            (inside("*.png"), Some("glob")),
-            (inside("video.mp4"), Some("ffmpeg")),
-            (inside("nothing.mp4"), None),
-        ] {
-            assert_eq!(kind_of(&spec), kind, "{spec}");
-        }
-    }
-
-    #[test]
-    fn what_is_not_there_is_an_io_error_with_its_name() {
-        for spec in ["/no/such/folder", "/no/such/video.mp4", "/no/such/a.npy", "/no/such/a.y4m", "/no/such/a.png"] {
-            let error = open(spec, &OpenOptions::default()).err().unwrap();
-            assert!(matches!(error, Error::Io { .. }) && error.to_string().contains(spec), "{error}");
-        }
-        let zero = OpenOptions { step: 0, ..OpenOptions::default() };
-        assert!(open("-", &zero).err().unwrap().to_string().contains("step"));
-    }
 }

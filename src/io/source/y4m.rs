@@ -300,6 +300,3 @@ impl<R: BufRead + Send, P: ChannelPolicy> FrameSource<P::Frame> for Y4mSource<R,
         format!("{} (Y4M, {} x {}, {} bit)", self.name.display(), self.width, self.height, self.layout.bits)
     }
 }
-
-#[cfg(test)]
-mod tests;

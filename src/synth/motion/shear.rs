@@ -26,14 +26,3 @@ impl Motion for SinusoidalShear {
         Box::new(move |x, y| (x + (to - from) * self.velocity(x, y, from).u, y))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::conformance;
-    use super::*;
-
-    #[test]
-    fn velocity_jacobian_and_paths_agree() {
-        conformance::check(&SinusoidalShear { speed: 1.5, wavelength: 48.0, phase: 7.0 }, 1e-6);
-    }
-}

@@ -26,8 +26,6 @@ mod render;
 mod scene;
 mod shape;
 mod sprite;
-#[cfg(test)]
-mod tests;
 mod value_noise;
 mod world;
 

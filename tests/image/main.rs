@@ -1,0 +1,17 @@
+//! Borders, smoothing, gradients, pyramids, corners, splines and pictures.
+
+mod border;
+mod corners;
+mod luminance;
+mod picture;
+mod picture_chart;
+mod picture_clusters;
+mod picture_diverging;
+mod picture_grey;
+mod picture_overlay;
+mod picture_quiver;
+mod picture_wheel;
+mod preprocess;
+mod quantise;
+mod sample;
+mod smooth;

@@ -1,0 +1,74 @@
+//! A flow field as `.npz`: every plane, and what it means as JSON.
+
+use crate::fields::numbered;
+use jacoflow::error::Error;
+use jacoflow::io::npz::NpzReader;
+use jacoflow::io::{read_npz_from, write_npz_to};
+use jacoflow::types::{FlowField, Rect, SamplingGrid};
+use std::io::Cursor;
+
+fn stored(field: &FlowField<f32>) -> NpzReader<Cursor<Vec<u8>>> {
+    let bytes = write_npz_to(Cursor::new(Vec::new()), "x.npz", field, "{\"method\":\"windowed\"}").unwrap();
+    NpzReader::new(bytes, "x.npz").unwrap()
+}
+
+#[test]
+fn every_plane_and_the_layout_come_back() {
+    let region = Some(Rect { x: 1, y: 0, width: 5, height: 5 });
+    for sites in [
+        SamplingGrid::default(),
+        SamplingGrid::Grid { region, stride: 2 },
+        SamplingGrid::Points(vec![(6, 4), (0, 0), (3, 2)]),
+        SamplingGrid::Points(vec![]),
+    ] {
+        if matches!(&sites, SamplingGrid::Points(p) if p.is_empty()) {
+            let field = FlowField::<f32>::empty(numbered(SamplingGrid::default()).layout, false).unwrap();
+            let mut layout = field.layout.clone();
+            layout.sites = sites;
+            let empty = FlowField::<f32>::empty(layout, false).unwrap();
+            assert_eq!(read_npz_from::<f32, _>(&mut stored(&empty)).unwrap().field, empty);
+            continue;
+        }
+        let field = numbered(sites);
+        let back = read_npz_from::<f32, _>(&mut stored(&field)).unwrap();
+        assert_eq!(back.field, field);
+        assert!(back.options.contains("windowed") && back.library.starts_with("jacoflow "));
+        let wide = read_npz_from::<f64, _>(&mut stored(&field)).unwrap().field;
+        assert_eq!(wide.motion[5], 5.0);
+    }
+}
+
+#[test]
+fn a_field_with_flipped_bytes_is_refused_or_the_same() {
+    let field = numbered(SamplingGrid::default());
+    let good = write_npz_to(Cursor::new(Vec::new()), "x.npz", &field, "").unwrap().into_inner();
+    let rng = jacoflow::math::random::CounterRng::new(4);
+    let mut refused = 0;
+    for case in 0..2000 {
+        let mut bytes = good.clone();
+        for k in 0..3 {
+            let at = (rng.uniform(3 * case + k) * bytes.len() as f64) as usize;
+            bytes[at] ^= 0x40;
+        }
+        let back = NpzReader::new(Cursor::new(bytes), "x.npz").and_then(|mut npz| read_npz_from::<f32, _>(&mut npz));
+        match back {
+            Ok(back) => assert!(back.field == field, "case {case} is wrong and not noticed"),
+            Err(error) => {
+                assert!(matches!(error, Error::Format { .. }) && error.to_string().contains("x.npz"), "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(refused > 1500, "{refused}");
+}
+
+#[test]
+fn flow_and_jacobian_are_arranged_for_numpy() {
+    let mut npz = stored(&numbered(SamplingGrid::default()));
+    let n = 35.0;
+    assert_eq!(npz.array::<f32>("flow").unwrap().values[2..4], [1.0, n + 1.0]);
+    let jacobian = npz.array::<f32>("jacobian").unwrap();
+    assert_eq!(jacobian.shape, [5, 7, 2, 2]);
+    assert_eq!(jacobian.values[..4], [2.0 * n, 4.0 * n, 3.0 * n, 5.0 * n], "u_x, u_y, v_x, v_y");
+    assert!(npz.text("metadata").unwrap().contains("\"min_norm\""));
+}

@@ -1,0 +1,3 @@
+//! Graph segmentation of images.
+
+mod segment;

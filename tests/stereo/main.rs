@@ -1,0 +1,5 @@
+//! Disparity of edge pixels and the row offset between two views.
+
+mod edges;
+mod options;
+mod row_offset;
