@@ -177,6 +177,3 @@ pub(super) fn check_size(first: &mut Option<(usize, usize)>, size: (usize, usize
     let got = format!("{} x {} in frame {index}", size.0, size.1);
     Err(Error::argument("frames", format!("one size, {width} x {height} as in the first frame"), got))
 }
-
-#[cfg(test)]
-mod tests;

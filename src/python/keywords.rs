@@ -48,4 +48,24 @@ macro_rules! constructor {
     };
 }
 
-pub(super) use {constructor, keep_options, with_common};
+/// Read-only attributes of a frozen class: `name(this, slf) -> type = value;` with the object as Rust has it
+/// and, where the value needs it, as Python has it.
+macro_rules! getters {
+    ($class:ty; $($(#[$doc:meta])* $name:ident($this:ident $(, $slf:ident)?) -> $type:ty = $value:expr;)*) => {
+        #[pymethods]
+        impl $class {
+            $(
+                $(#[$doc])*
+                #[getter]
+                #[allow(unused_variables, reason = "not every value needs both")]
+                fn $name<'py>(slf: &Bound<'py, Self>) -> $type {
+                    let $this = slf.get();
+                    $(let $slf = slf;)?
+                    $value
+                }
+            )*
+        }
+    };
+}
+
+pub(super) use {constructor, getters, keep_options, with_common};

@@ -7,6 +7,7 @@ use crate::error::Error;
 use crate::parallel::Threads;
 use crate::synth::registry::{CARRIERS, Parameter, SCENES};
 use crate::synth::{Rounding, Scene as CoreScene, SceneOptions, Sensor as CoreSensor, build, mean_truth, truth};
+use crate::python::keywords::getters;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -36,6 +37,14 @@ impl Scene {
         }
         Ok(room)
     }
+}
+
+getters! {
+    Scene;
+    /// Size (width, height) of the frames, px.
+    size(this) -> (usize, usize) = this.core.size();
+    /// Scene point (x, y) of pixel (0, 0), px.
+    origin(this) -> (f64, f64) = this.core.origin();
 }
 
 #[pymethods]
@@ -71,18 +80,6 @@ impl Scene {
     #[getter]
     fn name(&self) -> &str {
         &self.kind
-    }
-
-    /// Size (width, height) of the frames, px.
-    #[getter]
-    fn size(&self) -> (usize, usize) {
-        self.core.size()
-    }
-
-    /// Scene point (x, y) of pixel (0, 0), px.
-    #[getter]
-    fn origin(&self) -> (f64, f64) {
-        self.core.origin()
     }
 
     /// The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded

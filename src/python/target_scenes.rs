@@ -5,6 +5,7 @@ use super::options::Integer;
 use crate::error::Error;
 use crate::parallel::Threads;
 use crate::synth::targets::{SCENES, TargetScene as CoreScene, TargetSceneOptions};
+use crate::python::keywords::getters;
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -45,6 +46,18 @@ impl TargetScene {
     }
 }
 
+getters! {
+    TargetScene;
+    /// Name of the scene (no unit).
+    name(this) -> &'static str = this.core.name();
+    /// Size (width, height) of the frames, px.
+    size(this) -> (usize, usize) = this.core.size();
+    /// Number of targets K (no unit).
+    n_targets(this) -> usize = this.core.target_count();
+    /// Indices of the targets from the farthest to the nearest, which hides the others (no unit).
+    drawing_order(this, slf) -> PyResult<Bound<'py, PyTuple>> = PyTuple::new(slf.py(), this.core.drawing_order());
+}
+
 #[pymethods]
 impl TargetScene {
     #[new]
@@ -66,30 +79,6 @@ impl TargetScene {
         let threads = Threads::new(None)?;
         let core = py.detach(|| threads.install(|| CoreScene::new(name, options)))?;
         Ok(Self { core })
-    }
-
-    /// Name of the scene (no unit).
-    #[getter]
-    fn name(&self) -> &'static str {
-        self.core.name()
-    }
-
-    /// Size (width, height) of the frames, px.
-    #[getter]
-    fn size(&self) -> (usize, usize) {
-        self.core.size()
-    }
-
-    /// Number of targets K (no unit).
-    #[getter]
-    fn n_targets(&self) -> usize {
-        self.core.target_count()
-    }
-
-    /// Indices of the targets from the farthest to the nearest, which hides the others (no unit).
-    #[getter]
-    fn drawing_order<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, self.core.drawing_order())
     }
 
     /// Number of frames T (no unit).

@@ -1,4 +1,5 @@
-//! Tests of the filters against each other, against statistics, and against numbers recorded from filterpy (`tests/golden/filters.py`).
+//! Kalman filters against each other, against statistics, and against numbers recorded from filterpy
+//! (`tests/golden/filters.py`).
 
 use jacoflow::error::{Error, Result};
 use jacoflow::filter::{ExtendedFilter, GaussianState, KalmanFilter, SigmaPoints, UnscentedFilter};

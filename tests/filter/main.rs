@@ -1,4 +1,4 @@
-//! Kalman filters and the particle filter, each against definitions, records of filterpy and its own promises.
+//! Kalman filters and the particle filter against definitions, records of filterpy and their own promises.
 
 mod filter;
 mod particle;

@@ -2,6 +2,9 @@
 
 mod border;
 mod corners;
+mod jet_planes;
+mod jet_stencil;
+mod jet_time;
 mod luminance;
 mod picture;
 mod picture_chart;

@@ -126,16 +126,3 @@ impl Quantity {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_round_trip() {
-        for q in Quantity::ALL {
-            assert_eq!(Quantity::parse(q.name()).unwrap(), q);
-        }
-        assert!(Quantity::parse("vorticity").unwrap_err().to_string().contains("curl"));
-    }
-}

@@ -125,11 +125,4 @@ mod tests {
         let among = sharing_among(&layout(SamplingGrid::Grid { region: None, stride: 2 }, 1.5), 5, &all);
         assert!((grid - among).abs() < 1e-3, "{grid} {among}");
     }
-
-    #[test]
-    fn independent_and_far_estimates_share_nothing() {
-        assert_eq!(sharing(&layout(SamplingGrid::default(), 0.0)), 1.0);
-        assert_eq!(sharing(&layout(SamplingGrid::default(), f64::NAN)), 1.0);
-        assert!((sharing(&layout(SamplingGrid::Points(vec![(0, 0), (8, 4)]), 0.5)) - 1.0).abs() < 1e-12);
-    }
 }

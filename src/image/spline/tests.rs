@@ -191,39 +191,3 @@ fn neither_threads_nor_what_was_there_before_matter() {
     assert_eq!(one.size(), two.size());
     assert!(one.coefficients.iter().zip(&two.coefficients).all(|(a, b)| a.to_bits() == b.to_bits()));
 }
-
-/// Run with `cargo test --release --lib image::spline -- --ignored --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-#[allow(clippy::print_stderr)]
-fn time_per_pixel_of_each_level() {
-    let (w, h) = (640, 480);
-    let frame = noise::<f32>(w, h);
-    let of = |y: usize, by: f64| -> Vec<f32> {
-        (0..w).map(|x| (5.0 * (by * x as f64 + 0.02 * y as f64).sin()) as f32).collect()
-    };
-    let x: Vec<Vec<f32>> =
-        (0..h).map(|y| of(y, 0.03).iter().enumerate().map(|(x, d)| x as f32 + d).collect()).collect();
-    let y: Vec<Vec<f32>> = (0..h).map(|y| of(y, -0.04).iter().map(|d| y as f32 + d).collect()).collect();
-    let best = |work: &mut dyn FnMut()| {
-        let seconds = (0..20).map(|_| {
-            let start = std::time::Instant::now();
-            work();
-            start.elapsed().as_secs_f64()
-        });
-        seconds.fold(f64::MAX, f64::min) * 1e9 / (w * h) as f64
-    };
-    Threads::new(Some(1)).unwrap().install(|| {
-        for level in Level::available() {
-            let (mut spline, mut out) = (Spline::new(level, &frame), vec![0.0f32; w]);
-            let make = best(&mut || spline.refill(level, &frame));
-            let read = best(&mut || {
-                for row in 0..h {
-                    spline.sample_row(level, &x[row], &y[row], &mut out);
-                    std::hint::black_box(&out);
-                }
-            });
-            eprintln!("{}: refill {make:.2} ns/px, sample_row {read:.2} ns/px", level.name());
-        }
-    });
-}

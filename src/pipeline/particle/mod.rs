@@ -4,8 +4,6 @@
 mod foreground;
 mod overlay;
 mod rows;
-#[cfg(test)]
-mod tests;
 
 pub use foreground::ForegroundMaps;
 pub use overlay::ParticleOverlays;

@@ -5,8 +5,6 @@ mod graph;
 mod overlay;
 mod pairs;
 mod rows;
-#[cfg(test)]
-mod tests;
 mod times;
 
 pub use graph::{GraphChart, GraphFile};

@@ -3,8 +3,6 @@
 
 mod overlay;
 mod rows;
-#[cfg(test)]
-mod tests;
 
 pub use overlay::{Overlays, PATH_LENGTH};
 pub(super) use rows::{Row, RowWriter};

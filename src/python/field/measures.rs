@@ -3,99 +3,54 @@
 use super::{FlowField, Store, derived, each};
 use crate::python::arrays;
 use crate::python::options::{self, Region};
+use crate::python::keywords::getters;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-#[pymethods]
-impl FlowField {
+getters! {
+    FlowField;
     /// Divergence u_x + v_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
-    #[getter]
-    fn divergence<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "divergence")
-    }
-
+    divergence(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "divergence");
     /// Curl v_x - u_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns
     /// clockwise on the screen.
-    #[getter]
-    fn curl<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "curl")
-    }
-
+    curl(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "curl");
     /// Shear sqrt((u_x - v_y)^2 + (u_y + v_x)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame
     /// period.
-    #[getter]
-    fn shear_magnitude<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "shear_magnitude")
-    }
-
+    shear_magnitude(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "shear_magnitude");
     /// Direction of the greatest stretch, atan2(u_y + v_x, u_x - v_y) / 2, float64 array (..., H, W), rad in
     /// (-pi/2, pi/2], from x towards y.
-    #[getter]
-    fn shear_axis<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "shear_axis")
-    }
-
+    shear_axis(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "shear_axis");
     /// Stretch u_x along x, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
-    #[getter]
-    fn strain_xx<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "strain_xx")
-    }
-
+    strain_xx(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "strain_xx");
     /// Stretch v_y along y, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
-    #[getter]
-    fn strain_yy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "strain_yy")
-    }
-
+    strain_yy(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "strain_yy");
     /// Shear strain (u_y + v_x) / 2, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
-    #[getter]
-    fn strain_xy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "strain_xy")
-    }
-
+    strain_xy(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "strain_xy");
     /// Angular velocity (v_x - u_y) / 2, float64 array (..., H, W), rad/frame, or rad/s with a frame period.
-    #[getter]
-    fn angular_velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "angular_velocity")
-    }
-
+    angular_velocity(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "angular_velocity");
     /// Angular velocity, float64 array (..., H, W), revolutions per minute; ValueError without fps or
     /// frame_period.
-    #[getter]
-    fn rpm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "rpm")
-    }
-
+    rpm(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "rpm");
     /// Distance of the point that does not move, float64 array (..., H, W), px, or units of the pixel pitch.
-    #[getter]
-    fn centre_distance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "centre_distance")
-    }
-
+    centre_distance(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "centre_distance");
     /// Time 2 / (u_x + v_y) until contact with a surface parallel to the image, float64 array (..., H, W),
     /// frames, or s with a frame period; negative while it recedes.
-    #[getter]
-    fn time_to_contact<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "time_to_contact")
-    }
-
+    time_to_contact(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "time_to_contact");
     /// Speed sqrt(u^2 + v^2), float64 array (..., H, W), px/frame, or px/s with a frame period.
-    #[getter]
-    fn speed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.value(py, "speed")
-    }
-
+    speed(this, slf) -> PyResult<Bound<'py, PyAny>> = this.value(slf.py(), "speed");
     /// The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units of
     /// the pixel pitch.
     ///
     /// It need not be in the picture. NaN where there is none. `value` and `std` take its parts,
     /// rotation_centre_x and rotation_centre_y.
-    #[getter]
-    fn rotation_centre<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let both = (self.value(py, "rotation_centre_x")?, self.value(py, "rotation_centre_y")?);
-        py.import("numpy")?.call_method1("stack", (both, -1))
-    }
+    rotation_centre(this, slf) -> PyResult<Bound<'py, PyAny>> = {
+        let both = (this.value(slf.py(), "rotation_centre_x")?, this.value(slf.py(), "rotation_centre_y")?);
+        slf.py().import("numpy")?.call_method1("stack", (both, -1))
+    };
+}
 
+#[pymethods]
+impl FlowField {
     /// The parameter or derived quantity `name`, float64 array (..., H, W), in the unit that `unit(name)`
     /// gives.
     ///

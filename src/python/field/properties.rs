@@ -3,66 +3,88 @@
 use super::{FlowField, Slice, Store, each, state};
 use crate::python::{arrays, io};
 use crate::types::{SamplingGrid, Status};
+use crate::python::keywords::getters;
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice, PyTuple};
 use std::path::PathBuf;
 
-#[pymethods]
-impl FlowField {
+getters! {
+    FlowField;
     /// Flow, array (..., H, W, 2): (u, v) in px/frame along x (right) and y (down), or in units of
     /// `pixel_pitch` per frame.
     ///
     /// NaN where `status` says why. A read-only view.
-    #[getter]
-    fn flow<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::motion_slice(slf, 0, &[(2, 1)])
-    }
-
+    flow(this, slf) -> PyResult<Bound<'py, PyAny>> = Self::motion_slice(slf, 0, &[(2, 1)]);
     /// Jacobian of the flow, array (..., H, W, 2, 2) in 1/frame: [[u_x, u_y], [v_x, v_y]].
     ///
     /// A read-only view; zeros where the model assumes no derivatives.
-    #[getter]
-    fn jacobian<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::motion_slice(slf, 2, &[(2, 1), (2, 2)])
-    }
-
+    jacobian(this, slf) -> PyResult<Bound<'py, PyAny>> = Self::motion_slice(slf, 2, &[(2, 1), (2, 2)]);
     /// Flow along x (right), array (..., H, W), px/frame.
-    #[getter]
-    fn u<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::motion_slice(slf, 0, &[])
-    }
-
+    u(this, slf) -> PyResult<Bound<'py, PyAny>> = Self::motion_slice(slf, 0, &[]);
     /// Flow along y (down), array (..., H, W), px/frame.
-    #[getter]
-    fn v<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::motion_slice(slf, 1, &[])
-    }
-
+    v(this, slf) -> PyResult<Bound<'py, PyAny>> = Self::motion_slice(slf, 1, &[]);
     /// du/dx, array (..., H, W), 1/frame.
-    #[getter]
-    fn u_x<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::motion_slice(slf, 2, &[])
-    }
-
+    u_x(this, slf) -> PyResult<Bound<'py, PyAny>> = Self::motion_slice(slf, 2, &[]);
     /// dv/dx, array (..., H, W), 1/frame.
-    #[getter]
-    fn v_x<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::motion_slice(slf, 3, &[])
-    }
-
+    v_x(this, slf) -> PyResult<Bound<'py, PyAny>> = Self::motion_slice(slf, 3, &[]);
     /// du/dy, array (..., H, W), 1/frame.
-    #[getter]
-    fn u_y<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::motion_slice(slf, 4, &[])
-    }
-
+    u_y(this, slf) -> PyResult<Bound<'py, PyAny>> = Self::motion_slice(slf, 4, &[]);
     /// dv/dy, array (..., H, W), 1/frame.
-    #[getter]
-    fn v_y<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        Self::motion_slice(slf, 5, &[])
-    }
+    v_y(this, slf) -> PyResult<Bound<'py, PyAny>> = Self::motion_slice(slf, 5, &[]);
+    /// Status code of each site, uint8 array (..., H, W), see `Status`.
+    status(this, slf) -> PyResult<Bound<'py, PyAny>> = each!(this.store, packed => Self::show(slf, &Slice { data: &packed.status, planes: 1, first: 0, tail: &[] }));
+    /// Where the estimate is unique and complete, bool array (..., H, W).
+    valid(this, slf) -> PyResult<Bound<'py, PyAny>> = {
+        let (width, height) = this.size();
+        let sites = width * height;
+        let codes = each!(this.store, packed => &packed.status[this.start * sites..(this.start + this.count) * sites]);
+        let valid = codes.iter().map(|&code| Status::from_code(code).is_some_and(Status::is_valid)).collect();
+        Ok(arrays::owned::<bool>(slf.py(), &this.shape(), valid)?.into_any())
+    };
+    /// Root mean square residual of the equations, array (..., H, W), grey levels; None if the method has
+    /// none.
+    residual(this, slf) -> PyResult<Option<Bound<'py, PyAny>>> = each!(this.store, packed => packed.residual.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose());
+    /// Rank of the equations, uint8 array (..., H, W); None if the method has none.
+    rank(this, slf) -> PyResult<Option<Bound<'py, PyAny>>> = each!(this.store, packed => packed.rank.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose());
+    /// Condition number of the equations (largest over smallest singular value), array (..., H, W); None if
+    /// the method has none.
+    condition(this, slf) -> PyResult<Option<Bound<'py, PyAny>>> = each!(this.store, packed => packed.condition.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose());
+    /// Standard deviation of the Gaussian window that the Jacobian rests on, mean of those weighed in at the
+    /// pixel, array (..., H, W), px; None unless `method="coarse_to_fine"` with `diagnostics=True`.
+    ///
+    /// Windows are of fourth order: slopes have the noise of a plain least-squares fit in a window 0.66 times
+    /// as wide, and bias of sixth order.
+    window(this, slf) -> PyResult<Option<Bound<'py, PyAny>>> = each!(this.store, packed => packed.window.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose());
+    /// Pixel (x, y) of each site, int64 array (H, W, 2), for a list of points (N, 2).
+    points(this, slf) -> PyResult<Bound<'py, PyAny>> = {
+        let (width, height) = this.size();
+        let pixels = (0..height).flat_map(|row| (0..width).map(move |col| (col, row)));
+        let data = pixels.map(|(col, row)| this.layout().sites.pixel(col, row)).flat_map(|(x, y)| [x as i64, y as i64]);
+        let shape = if matches!(this.layout().sites, SamplingGrid::Points(_)) {
+            vec![width, 2]
+        } else {
+            vec![height, width, 2]
+        };
+        Ok(arrays::owned(slf.py(), &shape, data.collect())?.into_any())
+    };
+    /// Index of the frame the estimate belongs to, counted from 0 (no unit); of the first one for a stack.
+    frame_index(this) -> usize = this.first_frame();
+    /// Size (width, height) of the frames, px.
+    frame_size(this) -> (usize, usize) = this.layout().frame_size;
+    /// Seconds between frames, or None.
+    frame_period(this) -> Option<f64> = this.layout().frame_period;
+    /// Physical size (dx, dy) of a pixel, 1 px or any length unit.
+    pixel_pitch(this) -> (f64, f64) = this.layout().pixel_pitch;
+    /// How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0
+    /// where they are independent or it is not known.
+    correlation_length(this) -> f64 = this.layout().correlation_length;
+    /// Names of the model's parameters; `unit(name)` gives their units.
+    parameters(this, slf) -> PyResult<Bound<'py, PyTuple>> = PyTuple::new(slf.py(), &this.layout().parameters);
+}
 
+#[pymethods]
+impl FlowField {
     /// Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), px/frame and 1/frame squared; None
     /// if it was not requested.
     ///
@@ -80,108 +102,10 @@ impl FlowField {
         })
     }
 
-    /// Status code of each site, uint8 array (..., H, W), see `Status`.
-    #[getter]
-    fn status<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        each!(slf.get().store, packed => Self::show(slf, &Slice { data: &packed.status, planes: 1, first: 0, tail: &[] }))
-    }
-
-    /// Where the estimate is unique and complete, bool array (..., H, W).
-    #[getter]
-    fn valid<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let this = slf.get();
-        let (width, height) = this.size();
-        let sites = width * height;
-        let codes = each!(this.store, packed => &packed.status[this.start * sites..(this.start + this.count) * sites]);
-        let valid = codes.iter().map(|&code| Status::from_code(code).is_some_and(Status::is_valid)).collect();
-        Ok(arrays::owned::<bool>(slf.py(), &this.shape(), valid)?.into_any())
-    }
-
-    /// Root mean square residual of the equations, array (..., H, W), grey levels; None if the method has
-    /// none.
-    #[getter]
-    fn residual<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        each!(slf.get().store, packed => packed.residual.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
-    }
-
-    /// Rank of the equations, uint8 array (..., H, W); None if the method has none.
-    #[getter]
-    fn rank<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        each!(slf.get().store, packed => packed.rank.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
-    }
-
-    /// Condition number of the equations (largest over smallest singular value), array (..., H, W); None if
-    /// the method has none.
-    #[getter]
-    fn condition<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        each!(slf.get().store, packed => packed.condition.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
-    }
-
-    /// Standard deviation of the Gaussian window that the Jacobian rests on, mean of those weighed in at the
-    /// pixel, array (..., H, W), px; None unless `method="coarse_to_fine"` with `diagnostics=True`.
-    ///
-    /// Windows are of fourth order: slopes have the noise of a plain least-squares fit in a window 0.66 times
-    /// as wide, and bias of sixth order.
-    #[getter]
-    fn window<'py>(slf: &Bound<'py, Self>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        each!(slf.get().store, packed => packed.window.as_ref().map(|data| Self::show(slf, &Slice { data, planes: 1, first: 0, tail: &[] })).transpose())
-    }
-
-    /// Pixel (x, y) of each site, int64 array (H, W, 2), for a list of points (N, 2).
-    #[getter]
-    fn points<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let (width, height) = self.size();
-        let pixels = (0..height).flat_map(|row| (0..width).map(move |col| (col, row)));
-        let data = pixels.map(|(col, row)| self.layout().sites.pixel(col, row)).flat_map(|(x, y)| [x as i64, y as i64]);
-        let shape = if matches!(self.layout().sites, SamplingGrid::Points(_)) {
-            vec![width, 2]
-        } else {
-            vec![height, width, 2]
-        };
-        Ok(arrays::owned(py, &shape, data.collect())?.into_any())
-    }
-
-    /// Index of the frame the estimate belongs to, counted from 0 (no unit); of the first one for a stack.
-    #[getter]
-    fn frame_index(&self) -> usize {
-        self.first_frame()
-    }
-
-    /// Size (width, height) of the frames, px.
-    #[getter]
-    fn frame_size(&self) -> (usize, usize) {
-        self.layout().frame_size
-    }
-
-    /// Seconds between frames, or None.
-    #[getter]
-    fn frame_period(&self) -> Option<f64> {
-        self.layout().frame_period
-    }
-
-    /// Physical size (dx, dy) of a pixel, 1 px or any length unit.
-    #[getter]
-    fn pixel_pitch(&self) -> (f64, f64) {
-        self.layout().pixel_pitch
-    }
-
-    /// How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0
-    /// where they are independent or it is not known.
-    #[getter]
-    fn correlation_length(&self) -> f64 {
-        self.layout().correlation_length
-    }
-
     /// Name of the motion model (no unit).
     #[getter]
     fn model(&self) -> &str {
         &self.layout().model
-    }
-
-    /// Names of the model's parameters; `unit(name)` gives their units.
-    #[getter]
-    fn parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, &self.layout().parameters)
     }
 
     /// Shape of the site axes: (H, W), (N,) for points, with a leading T for a stack.

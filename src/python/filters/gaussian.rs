@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::filter::{GaussianState, check_covariances, check_mean};
 use crate::python::arrays;
+use crate::python::keywords::getters;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -155,7 +156,7 @@ impl GaussianFilter {
         for (index, name) in NAMES.iter().enumerate() {
             state.set_item(name, self.get(py, index))?;
         }
-        state.set_item("repairs", self.repairs())?;
+        state.set_item("repairs", self.variables().repairs)?;
         Ok(state)
     }
 
@@ -172,87 +173,55 @@ impl GaussianFilter {
     }
 }
 
+getters! {
+    GaussianFilter;
+    /// Mean, array (n,) or (B, n), in the state's units.
+    x(this, slf) -> Py<PyAny> = this.get(slf.py(), 0);
+    /// Covariance, array (n, n) or (B, n, n), in the state's units squared.
+    P(this, slf) -> Py<PyAny> = this.get(slf.py(), 1);
+    /// Process noise covariance, array (n, n) or (B, n, n), in the state's units squared per step.
+    Q(this, slf) -> Py<PyAny> = this.get(slf.py(), 2);
+    /// Measurement noise covariance, array (m, m) or (B, m, m), in the measurement's units squared.
+    R(this, slf) -> Py<PyAny> = this.get(slf.py(), 3);
+    /// Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where the
+    /// measurement was missing.
+    y(this, slf) -> Py<PyAny> = this.get(slf.py(), 4);
+    /// Covariance of the residual, array (m, m) or (B, m, m), in the measurement's units squared.
+    S(this, slf) -> Py<PyAny> = this.get(slf.py(), 5);
+    /// Gain of the last update, array (n, m) or (B, n, m), state units per measurement unit.
+    K(this, slf) -> Py<PyAny> = this.get(slf.py(), 6);
+    /// Logarithm of the last measurement's likelihood, array () or (B,), no unit.
+    log_likelihood(this, slf) -> Py<PyAny> = this.get(slf.py(), 7);
+    /// How often a covariance had lost its positive definiteness and was repaired (a count, no unit).
+    repairs(this) -> u64 = this.variables().repairs;
+    /// Dimensions n of the state (a count, no unit).
+    dim_x(this) -> usize = this.dim_x;
+    /// Dimensions m of the measurement (a count, no unit).
+    dim_z(this) -> usize = this.dim_z;
+    /// Number B of independent filters, or None where arrays have no leading axis (a count, no unit).
+    batch(this) -> Option<usize> = this.batch;
+}
+
 #[pymethods]
 impl GaussianFilter {
-    /// Mean, array (n,) or (B, n), in the state's units.
-    #[getter]
-    fn x(&self, py: Python<'_>) -> Py<PyAny> {
-        self.get(py, 0)
-    }
     #[setter]
     fn set_x(&self, value: &Bound<'_, PyAny>) -> PyResult<()> {
         self.set(0, self.covariance(0, value)?);
         Ok(())
-    }
-    /// Covariance, array (n, n) or (B, n, n), in the state's units squared.
-    #[getter(P)]
-    fn p(&self, py: Python<'_>) -> Py<PyAny> {
-        self.get(py, 1)
     }
     #[setter(P)]
     fn set_p(&self, value: &Bound<'_, PyAny>) -> PyResult<()> {
         self.set(1, self.covariance(1, value)?);
         Ok(())
     }
-    /// Process noise covariance, array (n, n) or (B, n, n), in the state's units squared per step.
-    #[getter(Q)]
-    fn q(&self, py: Python<'_>) -> Py<PyAny> {
-        self.get(py, 2)
-    }
     #[setter(Q)]
     fn set_q(&self, value: &Bound<'_, PyAny>) -> PyResult<()> {
         self.set(2, self.covariance(2, value)?);
         Ok(())
     }
-    /// Measurement noise covariance, array (m, m) or (B, m, m), in the measurement's units squared.
-    #[getter(R)]
-    fn r(&self, py: Python<'_>) -> Py<PyAny> {
-        self.get(py, 3)
-    }
     #[setter(R)]
     fn set_r(&self, value: &Bound<'_, PyAny>) -> PyResult<()> {
         self.set(3, self.covariance(3, value)?);
         Ok(())
-    }
-    /// Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where the
-    /// measurement was missing.
-    #[getter]
-    fn y(&self, py: Python<'_>) -> Py<PyAny> {
-        self.get(py, 4)
-    }
-    /// Covariance of the residual, array (m, m) or (B, m, m), in the measurement's units squared.
-    #[getter(S)]
-    fn s(&self, py: Python<'_>) -> Py<PyAny> {
-        self.get(py, 5)
-    }
-    /// Gain of the last update, array (n, m) or (B, n, m), state units per measurement unit.
-    #[getter(K)]
-    fn k(&self, py: Python<'_>) -> Py<PyAny> {
-        self.get(py, 6)
-    }
-    /// Logarithm of the last measurement's likelihood, array () or (B,), no unit.
-    #[getter]
-    fn log_likelihood(&self, py: Python<'_>) -> Py<PyAny> {
-        self.get(py, 7)
-    }
-    /// How often a covariance had lost its positive definiteness and was repaired (a count, no unit).
-    #[getter]
-    fn repairs(&self) -> u64 {
-        self.variables().repairs
-    }
-    /// Dimensions n of the state (a count, no unit).
-    #[getter]
-    fn dim_x(&self) -> usize {
-        self.dim_x
-    }
-    /// Dimensions m of the measurement (a count, no unit).
-    #[getter]
-    fn dim_z(&self) -> usize {
-        self.dim_z
-    }
-    /// Number B of independent filters, or None where arrays have no leading axis (a count, no unit).
-    #[getter]
-    fn batch(&self) -> Option<usize> {
-        self.batch
     }
 }

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::filter::{SigmaPoints, check_dimension};
 use crate::python::arrays;
+use crate::python::keywords::getters;
 use pyo3::prelude::*;
 
 /// Scaled sigma points (van der Merwe 2004): 2 n + 1 points with mean and covariance of the state.
@@ -14,6 +15,22 @@ use pyo3::prelude::*;
 pub struct MerweScaledSigmaPoints {
     pub n: usize,
     pub points: SigmaPoints,
+}
+
+getters! {
+    MerweScaledSigmaPoints;
+    /// Dimensions of the state (a count, no unit).
+    n(this) -> usize = this.n;
+    /// Spread of the points (no unit).
+    alpha(this) -> f64 = this.points.alpha;
+    /// Weight of prior knowledge in the centre's covariance weight (no unit).
+    beta(this) -> f64 = this.points.beta;
+    /// Secondary spread (no unit).
+    kappa(this) -> f64 = this.points.kappa;
+    /// Weights of the mean, array (2 n + 1,), centre first (no unit).
+    Wm(this, slf) -> PyResult<Bound<'py, PyAny>> = Ok(arrays::owned(slf.py(), &[SigmaPoints::count(this.n)], this.points.mean_weights(this.n))?.into_any());
+    /// Weights of the covariance, array (2 n + 1,), centre first (no unit).
+    Wc(this, slf) -> PyResult<Bound<'py, PyAny>> = Ok(arrays::owned(slf.py(), &[SigmaPoints::count(this.n)], this.points.covariance_weights(this.n))?.into_any());
 }
 
 #[pymethods]
@@ -36,36 +53,6 @@ impl MerweScaledSigmaPoints {
     fn __hash__(&self) -> u64 {
         let SigmaPoints { alpha, beta, kappa } = self.points;
         [alpha, beta, kappa].iter().fold(self.n as u64, |hash, part| hash.rotate_left(21) ^ part.to_bits())
-    }
-    /// Dimensions of the state (a count, no unit).
-    #[getter]
-    fn n(&self) -> usize {
-        self.n
-    }
-    /// Spread of the points (no unit).
-    #[getter]
-    fn alpha(&self) -> f64 {
-        self.points.alpha
-    }
-    /// Weight of prior knowledge in the centre's covariance weight (no unit).
-    #[getter]
-    fn beta(&self) -> f64 {
-        self.points.beta
-    }
-    /// Secondary spread (no unit).
-    #[getter]
-    fn kappa(&self) -> f64 {
-        self.points.kappa
-    }
-    /// Weights of the mean, array (2 n + 1,), centre first (no unit).
-    #[getter(Wm)]
-    fn mean_weights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Ok(arrays::owned(py, &[SigmaPoints::count(self.n)], self.points.mean_weights(self.n))?.into_any())
-    }
-    /// Weights of the covariance, array (2 n + 1,), centre first (no unit).
-    #[getter(Wc)]
-    fn covariance_weights<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Ok(arrays::owned(py, &[SigmaPoints::count(self.n)], self.points.covariance_weights(self.n))?.into_any())
     }
     /// Number of points, 2 n + 1 (a count, no unit).
     fn num_sigmas(&self) -> usize {

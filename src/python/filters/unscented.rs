@@ -6,6 +6,7 @@ use super::sigma_points::MerweScaledSigmaPoints;
 use crate::error::Error;
 use crate::filter::UnscentedFilter as Core;
 use crate::python::arrays;
+use crate::python::keywords::getters;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Mutex;
@@ -26,6 +27,18 @@ pub struct UnscentedKalmanFilter {
     points: MerweScaledSigmaPoints,
     dt: f64,
     augmented: bool,
+}
+
+getters! {
+    UnscentedKalmanFilter;
+    /// The sigma points in use (constants have no unit).
+    points_fn(this) -> MerweScaledSigmaPoints = this.points.clone();
+    /// Step handed to `fx`, in the unit that it expects.
+    dt(this) -> f64 = this.dt;
+    /// Whether the noise is part of the sigma points (no unit).
+    augmented(this) -> bool = this.augmented;
+    /// Whether new points are drawn for the measurement (no unit).
+    redraw(this) -> PyResult<bool> = Ok(lock(&this.core)?.redraw);
 }
 
 #[pymethods]
@@ -78,26 +91,6 @@ impl UnscentedKalmanFilter {
     #[setter]
     fn set_hx(&self, value: Py<PyAny>) {
         write(&self.hx, value);
-    }
-    /// The sigma points in use (constants have no unit).
-    #[getter]
-    fn points_fn(&self) -> MerweScaledSigmaPoints {
-        self.points.clone()
-    }
-    /// Step handed to `fx`, in the unit that it expects.
-    #[getter]
-    fn dt(&self) -> f64 {
-        self.dt
-    }
-    /// Whether the noise is part of the sigma points (no unit).
-    #[getter]
-    fn augmented(&self) -> bool {
-        self.augmented
-    }
-    /// Whether new points are drawn for the measurement (no unit).
-    #[getter]
-    fn redraw(&self) -> PyResult<bool> {
-        Ok(lock(&self.core)?.redraw)
     }
 
     /// Propagates mean and covariance through `fx` by `dt` (default: that of the constructor, same unit);

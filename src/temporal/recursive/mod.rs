@@ -22,8 +22,8 @@
 //!
 //! Noise of consecutive estimates counts as independent. It is not: a pair shares one frame with the next, a
 //! triple two. But shared frames enter with opposite signs (a difference's older frame is the newer one of
-//! the difference before), so that errors are correlated negatively, and the mean is better
-//! than its covariance says, never worse: `tests/recursive.rs` prints the correlations, down to -1/2.
+//! the difference before), so that errors are correlated negatively (down to -1/2, by
+//! `tests/temporal/recursive.rs`), and the mean is better than its covariance says, never worse.
 //!
 //! # Motion that changes
 //! *Innovation test.* `n = m_k - x_{k-1}` normalised by its covariance, `n^T S^-1 n`, has six degrees of
@@ -45,6 +45,3 @@ mod options;
 pub use fusion::RecursiveFusion;
 pub use kernel::{FADE, RESTART, SHARE};
 pub use options::RecursiveOptions;
-
-#[cfg(test)]
-mod tests;

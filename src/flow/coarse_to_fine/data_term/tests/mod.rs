@@ -3,7 +3,6 @@
 mod oracle;
 
 use super::*;
-use crate::parallel::Threads;
 use oracle::Case;
 
 impl Case {
@@ -114,54 +113,4 @@ fn threads_change_no_bit() {
         (bits, residuals.iter().map(|r| r.to_bits()).collect::<Vec<_>>())
     };
     assert_eq!(bits(1), bits(2));
-}
-
-#[test]
-#[ignore = "prints how long a pixel takes; build with --release"]
-#[allow(clippy::print_stderr)]
-fn time_of_a_pixel() {
-    for size in [(640, 480), (1920, 1080), (160, 120)] {
-        for views in [2, 3] {
-            let case = Case::new(size, views, 1.5);
-            let splines: Vec<Spline<f32>> =
-                case.frames.iter().map(|f| Spline::new(Level::detect(), &f.map(|v| *v as f32))).collect();
-            let views: Vec<_> = match splines.as_slice() {
-                [a, b] => View::pair([a, b], [None; 2]).to_vec(),
-                [a, b, c] => View::triple([a, b, c], [None; 3]).to_vec(),
-                _ => unreachable!(),
-            };
-            let mut motion = Planes::new(size.0.div_ceil(2), size.1.div_ceil(2), MOTION);
-            for k in 0..MOTION {
-                for y in 0..motion.height {
-                    let row = motion.width * y;
-                    for (x, v) in motion.line_mut(k, y).iter_mut().enumerate() {
-                        *v = case.motion[k][row + x] as f32;
-                    }
-                }
-            }
-            for level in [Level::avx2(), Level::avx512()].into_iter().flatten() {
-                let pool = Pool::default();
-                let term = DataTerm::<f32>::new(level, DataOptions::default(), &pool);
-                let mut out = Planes::default();
-                Threads::new(Some(1)).unwrap().install(|| {
-                    let mut times: Vec<f64> = (0..40)
-                        .map(|_| {
-                            let start = std::time::Instant::now();
-                            term.linearise(size, &views, &motion, Some(3.0), &mut out);
-                            start.elapsed().as_secs_f64()
-                        })
-                        .collect();
-                    times.sort_by(f64::total_cmp);
-                    let pixels = (size.0 * size.1) as f64;
-                    eprintln!(
-                        "{size:?} {} views {}: {:.2} ns/px (median {:.2})",
-                        views.len(),
-                        level.name(),
-                        times[0] / pixels * 1e9,
-                        times[20] / pixels * 1e9
-                    );
-                });
-            }
-        }
-    }
 }

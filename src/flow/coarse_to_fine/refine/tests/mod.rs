@@ -203,29 +203,3 @@ fn nothing_comes_of_nothing_and_missing_data_stay_finite() {
     let got = refined(&motion, &Planes::new(40, 30, 26));
     assert!((0..8).all(|k| (0..30).all(|y| got.line(k, y).iter().all(|v| v.is_finite()))));
 }
-
-/// Prints the time for a frame of 640x480: `cargo test --release --lib refine::tests::time -- --ignored
-/// --nocapture`.
-#[test]
-#[ignore = "a measurement"]
-#[allow(clippy::print_stdout)]
-fn time() {
-    let motion = field::<f32>(320, 240, |k, x, y| {
-        let cells = if ((x / 90.0).floor() + (y / 70.0).floor()) as i64 % 2 == 0 { 2.0 } else { -1.0 };
-        cells + (x / 60.0 + k as f64).sin() + 0.05 * white((x / SITE_SPACING) as usize, (y / SITE_SPACING) as usize, k)
-    });
-    let data = statistics(320, 240, density(0.05));
-    let space = PlanePool::default();
-    let levels = Level::from_environment().unwrap().map_or_else(Level::available, |level| vec![level]);
-    for level in levels {
-        let mut best = f64::INFINITY;
-        for _ in 0..8 {
-            let start = std::time::Instant::now();
-            let out = Threads::new(Some(1)).unwrap();
-            let out = out.install(|| refine(level, &space, &seven(), &motion, &data).0);
-            best = best.min(start.elapsed().as_secs_f64());
-            space.keep(out);
-        }
-        println!("{}: {:.2} ms, {:.1} ns/pixel", level.name(), best * 1e3, best * 1e9 / (640.0 * 480.0));
-    }
-}

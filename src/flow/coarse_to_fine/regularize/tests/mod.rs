@@ -182,28 +182,3 @@ fn threads_do_not_change_a_bit() {
         assert!([2, 3, 4].iter().all(|&threads| of(threads) == one));
     }
 }
-
-/// `cargo test --release --lib regularize::tests::speed -- --ignored --nocapture`
-#[test]
-#[ignore = "measures"]
-#[allow(clippy::print_stdout)]
-fn speed() {
-    for (w, h) in [(320, 240), (960, 540)] {
-        let data = made::<f32>(w, h, |x, y| Some(rough(x, y)));
-        let start = filled::<f32>(w, h, |x, y| rough(x + 300, y));
-        for (level, threads) in Level::available().into_iter().map(|l| (l, 1)).chain([(Level::detect(), 2)]) {
-            let mut scratch = RegularizeScratch::default();
-            let mut times = Vec::new();
-            Threads::new(Some(threads)).unwrap().install(|| {
-                for _ in 0..if level == Level::SCALAR { 3 } else { 20 } {
-                    let mut motion = start.clone();
-                    let begin = std::time::Instant::now();
-                    regularize(level, &data, &mut motion, &ROBUST, 0.05, &mut scratch);
-                    times.push(begin.elapsed().as_secs_f64());
-                }
-            });
-            let best = times.into_iter().fold(f64::INFINITY, f64::min) * 1e9 / (w * h * ROBUST.sweeps) as f64;
-            println!("{w} x {h}, {}, {threads} thread(s): {best:.2} ns a site and sweep", level.name());
-        }
-    }
-}

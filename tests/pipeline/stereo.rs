@@ -1,17 +1,20 @@
-use super::*;
-use crate::image::Preprocess;
-use crate::io::{MemorySource, ViewPairs};
-use crate::parallel::{Silent, Threads};
-use crate::pipeline::TableTarget;
-use crate::track::stereo::{StereoMode, StereoTrackerOptions};
-use crate::types::Frame;
-use std::path::Path;
+//! From pairs of views to tracks of everything that moves: views, preparation, grey levels, the stereo
+
+use jacoflow::error::{Error, Result};
+use jacoflow::image::Preprocess;
+use jacoflow::io::{MemorySource, ViewPairs};
+use jacoflow::parallel::{Silent, Threads};
+use jacoflow::pipeline::{BeginSinks, ClusterRows, Ending, GraphChart, GraphFile, GreyPairs, Numbering, StereoOverlays, StereoPicture, StereoRun, StereoSink, StereoStep, StereoSummary, TableTarget};
+use jacoflow::track::StereoTracker;
+use jacoflow::track::stereo::{StereoMode, StereoTrackerOptions, TrackGraph};
+use jacoflow::types::{AnyFrame, Frame};
+use std::path::{Path, PathBuf};
 
 const SIZE: (usize, usize) = (96, 64);
 
 /// Cells of 8 px that move 2 px/step, seen at a disparity of 3 px.
 fn views(steps: usize) -> ViewPairs {
-    let rng = crate::math::random::CounterRng::new(3);
+    let rng = jacoflow::math::random::CounterRng::new(3);
     let level = |x: usize, y: usize| (20.0 + 200.0 * rng.uniform((1000 * (y / 8) + x / 8) as u64)) as u8;
     let source = |shift: usize| {
         let frame =

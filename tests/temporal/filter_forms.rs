@@ -1,8 +1,5 @@
-//! How the forms of the flow filter differ, on the patent's ramp. `cargo test --test filter_forms --
+//! How the forms of the flow filter differ, on the patent's ramp. `cargo test --test temporal filter_forms --
 //! --nocapture` prints the figures.
-
-// The figures are printed so that the pages can name a command that shows them.
-#![allow(clippy::print_stdout)]
 
 use jacoflow::image::{GaussianSmoother, Quantiser};
 use jacoflow::synth::{RotatingRamp, Scene};

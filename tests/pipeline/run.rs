@@ -1,9 +1,10 @@
-use super::super::sink::Collect;
-use super::super::stage::Output;
-use super::*;
-use crate::io::MemorySource;
-use crate::parallel::Silent;
-use crate::types::{AnyFrame, FieldLayout, FlowField, Frame, SamplingGrid};
+//! The loop over frames.
+
+use jacoflow::error::{Error, Result};
+use jacoflow::io::{FrameSource, MemorySource};
+use jacoflow::parallel::{Progress, Silent};
+use jacoflow::pipeline::{Collect, Ending, Numbering, Output, Pipeline, Sink, Stage, Step};
+use jacoflow::types::{AnyFrame, FieldLayout, FlowField, Frame, SamplingGrid, Status};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 

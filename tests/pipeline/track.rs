@@ -1,10 +1,13 @@
-use super::*;
-use crate::image::GaussianSmoother;
-use crate::image::picture::TrackOverlay;
-use crate::io::{Colour, MemorySource, read_image, read_mot};
-use crate::parallel::Silent;
-use crate::pipeline::{TableTarget, TextFormat, peek};
-use crate::types::TargetBox;
+//! From a frame source to tracks: source, preparation, grey levels, trackers, sinks; one frame at a time, in
+
+use jacoflow::error::{Error, Result};
+use jacoflow::image::picture::TrackOverlay;
+use jacoflow::image::{GaussianSmoother, Preprocess};
+use jacoflow::io::{Colour, FrameSource, MemorySource, read_image, read_mot};
+use jacoflow::parallel::Silent;
+use jacoflow::pipeline::{Begin, Begun, Numbering, Overlays, TableTarget, TextFormat, TrackFormat, TrackRows, TrackRun, TrackSink, peek};
+use jacoflow::track::Tracker;
+use jacoflow::types::{AnyFrame, Frame, TargetBox, TrackState, TrackStatus};
 use std::path::Path;
 
 /// Goes one pixel to the right a frame, takes the frame's brightness for its gain, and fails at a frame of

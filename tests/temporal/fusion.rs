@@ -1,23 +1,34 @@
 //! Fusion of synthetic estimates with known noise and systematic error.
 
-use super::fusion::RecursiveFusion;
-use super::options::RecursiveOptions;
-use crate::flow::symmetric::upper;
-use crate::flow::{Estimator, EstimatorOptions, Method};
-use crate::math::random::CounterRng;
-use crate::parallel::Threads;
-use crate::simd::{Level, SimdReal};
-use crate::types::{FieldLayout, FlowField, SamplingGrid, Status};
+use jacoflow::math::Real;
+use jacoflow::flow::{Estimator, EstimatorOptions, Method};
+use jacoflow::math::random::CounterRng;
+use jacoflow::parallel::Threads;
+use jacoflow::simd::Level;
+use jacoflow::temporal::{RecursiveFusion, RecursiveOptions};
+use jacoflow::types::{FieldLayout, FlowField, SamplingGrid, Status};
 use nalgebra::{Matrix6, Vector6};
 
 const SIDE: usize = 40;
+
 const SITES: usize = SIDE * SIDE;
 
-fn fusion<T: SimdReal>(forgetting: f64, threads: usize, simd: Option<Level>) -> RecursiveFusion<T> {
+/// Index of the element `(i, j)`, `i <= j`, among the 21 of a symmetric matrix.
+const fn upper(i: usize, j: usize) -> usize {
+    i * 6 - i * (i + 1) / 2 + j
+}
+
+fn estimator(threads: usize, simd: Option<Level>) -> Estimator {
     let threads = Threads::new(Some(threads)).unwrap();
     let common = EstimatorOptions { covariance: true, systematic: true, threads, simd, ..EstimatorOptions::default() };
-    let estimator = Estimator::new(Method::parse("windowed").unwrap(), common).unwrap();
-    RecursiveFusion::new(&estimator, RecursiveOptions { forgetting }).unwrap()
+    Estimator::new(Method::parse("windowed").unwrap(), common).unwrap()
+}
+
+/// A fusion of estimates in the given precision.
+macro_rules! fusion {
+    ($real:ty, $forgetting:expr, $threads:expr, $simd:expr) => {
+        RecursiveFusion::<$real>::new(&estimator($threads, $simd), RecursiveOptions { forgetting: $forgetting }).unwrap()
+    };
 }
 
 /// Source of estimates: covariance `N + B`, `B` that of an error common to all times.
@@ -46,12 +57,12 @@ impl Estimates {
     }
 
     /// The field of time `k`, whose true motion is `truth + more`.
-    fn field<T: SimdReal>(&self, k: usize, more: &Vector6<f64>) -> FlowField<T> {
+    fn field<T: Real>(&self, k: usize, more: &Vector6<f64>) -> FlowField<T> {
         let layout = FieldLayout {
             frame_size: (SIDE, SIDE),
             sites: SamplingGrid::default(),
             model: "affine".into(),
-            parameters: crate::types::MOTION_NAMES.map(String::from).to_vec(),
+            parameters: jacoflow::types::MOTION_NAMES.map(String::from).to_vec(),
             frame_period: None,
             pixel_pitch: (1.0, 1.0),
             frame_index: k,
@@ -79,7 +90,7 @@ impl Estimates {
     }
 
     /// Root mean square error of u and mean normalised error squared of the six.
-    fn errors<T: SimdReal>(&self, field: &FlowField<T>, more: &Vector6<f64>) -> (f64, f64) {
+    fn errors<T: Real>(&self, field: &FlowField<T>, more: &Vector6<f64>) -> (f64, f64) {
         let (mut square, mut normalised) = (0.0, 0.0);
         for site in 0..SITES {
             let m = Vector6::from_fn(|k, _| field.motion[k * SITES + site].to_f64());
@@ -99,13 +110,12 @@ fn still() -> Vector6<f64> {
 
 /// Slope of the logarithm of the error over the logarithm of the number of estimates, 1 to 32, and normalised
 /// errors squared that average six.
-fn law<T: SimdReal>() {
+fn law<T: Real>(mut fuse: impl FnMut(&mut FlowField<T>)) {
     let made = Estimates::new(0.0);
-    let mut fusion = fusion::<T>(1.0, 1, None);
     let mut points = Vec::new();
     for k in 0..32 {
         let mut field = made.field::<T>(k, &still());
-        fusion.fuse(&mut field).unwrap();
+        fuse(&mut field);
         let (error, normalised) = made.errors(&field, &still());
         assert!((5.6..6.5).contains(&normalised), "{k}: {normalised}");
         if (k + 1).is_power_of_two() {
@@ -121,14 +131,16 @@ fn law<T: SimdReal>() {
 
 #[test]
 fn independent_noise_falls_with_the_root_of_the_frames() {
-    law::<f64>();
-    law::<f32>();
+    let mut double = fusion!(f64, 1.0, 1, None);
+    law::<f64>(|field| double.fuse(field).unwrap());
+    let mut single = fusion!(f32, 1.0, 1, None);
+    law::<f32>(|field| single.fuse(field).unwrap());
 }
 
 #[test]
 fn forgetting_stops_the_fall_where_its_memory_ends() {
     let made = Estimates::new(0.0);
-    let mut fusion = fusion::<f64>(0.9, 1, None);
+    let mut fusion = fusion!(f64, 0.9, 1, None);
     let (mut first, mut last) = (0.0, (0.0, 0.0));
     for k in 0..50 {
         let mut field = made.field(k, &still());
@@ -147,7 +159,7 @@ fn forgetting_stops_the_fall_where_its_memory_ends() {
 #[test]
 fn what_every_estimate_has_does_not_average_out_and_the_covariance_says_so() {
     let made = Estimates::new(0.25);
-    let mut fusion = fusion::<f64>(1.0, 1, None);
+    let mut fusion = fusion!(f64, 1.0, 1, None);
     let mut last = (0.0, 0.0);
     let mut deviation = 0.0;
     for k in 0..40 {
@@ -166,7 +178,7 @@ fn a_sudden_change_starts_anew_and_a_slow_one_shortens_the_memory() {
     let made = Estimates::new(0.0);
     let deviation = made.noise[(0, 0)].sqrt();
     let jump = Vector6::from([10.0 * deviation, 0.0, 0.0, 0.0, 0.0, 0.0]);
-    let mut sudden = fusion::<f64>(0.95, 1, None);
+    let mut sudden = fusion!(f64, 0.95, 1, None);
     for k in 0..20 {
         let more = if k < 16 { still() } else { jump };
         let mut field = made.field(k, &more);
@@ -175,7 +187,7 @@ fn a_sudden_change_starts_anew_and_a_slow_one_shortens_the_memory() {
         assert!(k < 16 || (error < 1.2 * deviation && normalised < 7.5), "{k}: {error} {normalised}");
     }
     for rate in [0.05, 0.2, 0.5] {
-        let mut slow = fusion::<f64>(0.95, 1, None);
+        let mut slow = fusion!(f64, 0.95, 1, None);
         for k in 0..60 {
             let more = jump * (0.1 * rate * k as f64);
             let mut field = made.field(k, &more);
@@ -190,7 +202,7 @@ fn a_sudden_change_starts_anew_and_a_slow_one_shortens_the_memory() {
 #[test]
 fn a_time_without_estimate_gets_the_prediction_with_a_growing_covariance() {
     let made = Estimates::new(0.1);
-    let mut one = fusion::<f64>(0.9, 1, None);
+    let mut one = fusion!(f64, 0.9, 1, None);
     let mut before = made.field::<f64>(0, &still());
     let never = 77;
     let bury = |field: &mut FlowField<f64>, site: usize, status: Status| {
@@ -223,7 +235,7 @@ fn a_time_without_estimate_gets_the_prediction_with_a_growing_covariance() {
 #[test]
 fn the_kernel_is_the_information_filter() {
     let made = Estimates::new(0.0);
-    let mut one = fusion::<f64>(0.95, 1, Some(Level::SCALAR));
+    let mut one = fusion!(f64, 0.95, 1, Some(Level::SCALAR));
     let mut oracle: Vec<(Vector6<f64>, Matrix6<f64>)> = Vec::new();
     for k in 0..6 {
         let mut field = made.field::<f64>(k, &still());
@@ -251,8 +263,8 @@ fn the_kernel_is_the_information_filter() {
 #[test]
 fn results_do_not_depend_on_threads_nor_much_on_lanes_and_go_on_from_a_state() {
     let made = Estimates::new(0.2);
-    let (mut one, mut two) = (fusion::<f32>(0.95, 1, None), fusion::<f32>(0.95, 2, None));
-    let mut plain = fusion::<f32>(0.95, 1, Some(Level::SCALAR));
+    let (mut one, mut two) = (fusion!(f32, 0.95, 1, None), fusion!(f32, 0.95, 2, None));
+    let mut plain = fusion!(f32, 0.95, 1, Some(Level::SCALAR));
     for k in 0..6 {
         let [mut a, mut b, mut c] = [0; 3].map(|_| made.field::<f32>(k, &still()));
         one.fuse(&mut a).unwrap();
@@ -264,7 +276,7 @@ fn results_do_not_depend_on_threads_nor_much_on_lanes_and_go_on_from_a_state() {
         assert!(far * 1000 < SITES, "{far}");
         let (sites, state) = two.state();
         let state = state.to_vec();
-        two = fusion::<f32>(0.95, 2, None);
+        two = fusion!(f32, 0.95, 2, None);
         two.restore(sites, state).unwrap();
     }
     assert!(two.restore(3, vec![0.0; 5]).unwrap_err().to_string().contains("state"));

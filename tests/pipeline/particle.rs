@@ -1,14 +1,17 @@
-use super::*;
-use crate::image::picture::TrackOverlay;
-use crate::io::{Colour, Grey, MemorySource, read_image, read_mot};
-use crate::parallel::Silent;
-use crate::pipeline::sink::TableTarget;
-use crate::pipeline::track::TrackFormat;
-use crate::types::Frame;
+//! From colour frames to targets followed by particle filters: source, tracker, sinks; one frame at a time,
+
+use jacoflow::error::{Error, Result};
+use jacoflow::image::picture::TrackOverlay;
+use jacoflow::io::{Colour, ColourSource, Grey, MemorySource, read_image, read_mot};
+use jacoflow::parallel::{Progress, Silent};
+use jacoflow::pipeline::{ForegroundMaps, Numbering, ParticleOverlays, ParticleRows, ParticleRun, ParticleSink, TableTarget, TargetStart, TrackFormat};
+use jacoflow::track::particle::ParticleOptions;
+use jacoflow::types::{AnyColourFrame, Frame, TargetBox};
 use std::cell::Cell;
 use std::path::Path;
 
 const SIZE: (usize, usize) = (96, 64);
+
 /// Sides of both targets, px.
 const SIDES: (usize, usize) = (16, 20);
 

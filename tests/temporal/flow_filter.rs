@@ -10,9 +10,7 @@ use jacoflow::temporal::{FilterForm, FlowFilter, FlowFilterOptions, Transition};
 use jacoflow::types::{Frame, Mask, Rect, SamplingGrid, Status};
 use std::f64::consts::PI;
 
-#[path = "flow_filter/equivalence.rs"]
 mod equivalence;
-#[path = "flow_filter/promises.rs"]
 mod promises;
 
 const TRUTH: [f64; 6] = [-80.0 * PI / 100.0, 60.0 * PI / 100.0, 0.0, PI / 100.0, -PI / 100.0, 0.0];
@@ -71,7 +69,7 @@ fn errors(means: &[[f64; 12]]) -> Errors {
 
 #[test]
 fn agrees_with_filterpy_over_400_frames() {
-    let record: serde_json::Value = serde_json::from_str(include_str!("golden/flow_filter.json")).unwrap();
+    let record: serde_json::Value = serde_json::from_str(include_str!("../golden/flow_filter.json")).unwrap();
     let frames = reference_frames(400, true);
     for (name, form) in [("augmented", FilterForm::Augmented), ("non_augmented", FilterForm::NonAugmented)] {
         let options = at_centre(FlowFilterOptions { form, ..FlowFilterOptions::patent() });

@@ -1,9 +1,6 @@
 //! Estimates of steady motion fused over time: how the error falls, what the covariance says of it, and what
 //! happens where motion changes or frames have holes.
 
-// Printed on purpose: the figures reached are part of the answer.
-#![allow(clippy::print_stdout)]
-
 use jacoflow::flow::coarse_to_fine::CoarseToFineOptions;
 use jacoflow::flow::windowed::WindowedOptions;
 use jacoflow::flow::{Estimator, EstimatorOptions, Method};
