@@ -91,10 +91,9 @@ impl Transition {
 /// roots `L`, `L L^T = P`, it is.
 ///
 /// To second order the points have the same moments with any root, beyond that not. On the patent's ramp
-/// (frames 200 to 399, by `tests/temporal/filter_forms.rs`) 25 points with the profile `measured` have rms errors
-/// of `u` that differ by less than 0.3 % between the two orders; while the filter settles the states are up to 1.9 standard deviations apart, then up to 0.12. With the patent's large process noise the
-/// order matters: the rms error of `u` is 0.063 px with the brightness first and 0.30 px with the motion
-/// first.
+/// (frames 200 to 399, by `tests/temporal/filter_forms.rs`) the rms errors of `u` differ by less than 0.3 %
+/// with the profile `measured`. With the patent's large process noise they are 0.063 px with the brightness
+/// first and 0.30 px with the motion first.
 ///
 /// Brightness first cannot be had from fewer points: each of its twelve columns moves the motion, in which
 /// the step is a polynomial of fourth degree, so that the step must be evaluated at 25 motions. Motion first,
