@@ -90,7 +90,10 @@ pub(super) fn align(task: Task<'_>, guess: &Pose, gain: f64) -> Option<Alignment
                 break;
             }
         }
-        gain = level.gain(&pose, gain);
+        // Of a target of which part was never seen, what hides it would count as its brightness.
+        if silent.is_none() || task.target.fresh.is_none() || !crate::ablation::keeps("gradient.emerging") {
+            gain = level.gain(&pose, gain);
+        }
     }
     let (inverse, s, round) = last?;
     if !pose.p.iter().chain(pose.a.as_flattened()).all(|value| value.is_finite()) {

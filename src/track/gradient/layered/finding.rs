@@ -15,6 +15,8 @@ pub(super) const LEVELS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];
 pub(super) const MIN_VISIBILITY_TO_LEARN: f64 = 0.75;
 /// Least visibility that is measured; and after a miss.
 pub(super) const MIN_VISIBILITY: [f64; 2] = [0.35, 0.5];
+/// Least difference of the target from what is behind it, over the noise.
+pub(super) const MIN_CONTRAST_PER_NOISE: f64 = 1.0;
 /// Innovation squared from which on a measurement is doubted.
 pub(super) const DOUBTED_INNOVATION: f64 = 12.0;
 /// Frames in which the support is still adapting to what the box holds.

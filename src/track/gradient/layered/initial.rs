@@ -26,6 +26,8 @@ const MAX_CHANGE: f64 = 40.0;
 const NEARLY: [f64; 2] = [0.05, 0.25];
 /// Share of the change that may be left.
 const MAX_CHANGE_LEFT: f64 = 0.5;
+/// Difference of displacements that whole pixels, and what is behind the target, may make, px.
+pub(super) const WHOLE_PIXEL_TOLERANCE: f64 = 2.0;
 /// Pixels that judge a displacement, about.
 const VOTES: f64 = 1024.0;
 

@@ -1,10 +1,14 @@
 //! The target in a frame: where the filter expects it, beside what covers or touches it, or all around.
 
 use super::finding::{
-    DOUBTED_INNOVATION, Finding, LEVELS, MAX_ADJACENT_SHARE, MAX_UNDOUBTED_INNOVATION, MIN_VISIBILITY,
-    MIN_VISIBILITY_TO_LEARN, PRIOR, SEARCHED, TOUCHED, try_at,
+    DOUBTED_INNOVATION, Finding, LEVELS, MAX_ADJACENT_SHARE, MAX_UNDOUBTED_INNOVATION, MIN_CONTRAST_PER_NOISE,
+    MIN_VISIBILITY, MIN_VISIBILITY_LOSS, MIN_VISIBILITY_TO_LEARN, PRIOR, SEARCHED, TOUCHED, try_at,
 };
-use super::occlusion::{is_settled, locate_entering_occlusion, locate_occluded, may_be_held_back, position_std};
+use super::initial::WHOLE_PIXEL_TOLERANCE;
+use super::occlusion::{
+    is_emerging, is_settled, locate_emerging, locate_entering_occlusion, locate_occluded, may_be_held_back,
+    position_std,
+};
 use super::reshaped::locate_reshaped;
 use super::resized::locate_resized;
 use super::scene::shift;
@@ -15,10 +19,10 @@ use crate::types::Frame;
 
 /// That of size and angle where a look-alike touches, whose pull may go a long way with the target.
 pub(super) const STIFF: f64 = 0.005;
+/// Standard deviation of a displacement in whole pixels, px.
+const DISPLACEMENT_STD: f64 = 1.0;
 /// Below this visibility it is looked for all around.
 pub(super) const MIN_VISIBILITY_WITHOUT_SEARCH: f64 = 0.6;
-/// Least difference of the target from what is behind it, over the noise.
-pub(super) const MIN_CONTRAST_PER_NOISE: f64 = 1.0;
 /// The same from which on, on one side, a look-alike touches.
 pub(super) const TOUCH: (f64, f64) = (0.08, 0.6);
 /// What is said where it did a moment ago, and its pull may still be felt.
@@ -30,9 +34,20 @@ pub(super) const REACH: (usize, usize) = (12, 36);
 
 /// The target in the frame, if it is seen well enough to be measured.
 pub(super) fn locate(state: &State, frame: &Frame<f64>) -> Option<Finding> {
+    if is_emerging(state) {
+        return locate_emerging(state, frame).or_else(|| search_around(state, frame));
+    }
     let interrupted = state.history.occluded || state.history.missed > 0;
     let levels = if state.history.age > 0 && state.history.missed == 0 { &LEVELS[1..] } else { &LEVELS[..] };
-    let plain = try_at(state, frame, &state.expected(), (state.motion_model, VoteMask::None, PRIOR, levels));
+    // A target that comes out of cover has the size that it had: the part that is seen would fit a smaller one.
+    let returns = state.history.missed > 0 || state.history.reappearing > 0;
+    let motion_model = if returns && crate::ablation::keeps("gradient.returning_size") {
+        MotionModel::Translation
+    } else {
+        state.motion_model
+    };
+    let plain = try_at(state, frame, &state.expected(), (motion_model, VoteMask::None, PRIOR, levels));
+    let plain = locate_displaced(state, frame, plain.as_ref()).or(plain);
     let mut best = plain;
     let doubted = crate::ablation::keeps("gradient.occlusion")
         && plain.is_none_or(|found| {
@@ -76,6 +91,25 @@ pub(super) fn locate(state: &State, frame: &Frame<f64>) -> Option<Finding> {
             && (!crate::ablation::keeps("gradient.minimum_contrast")
                 || found.score.contrast >= MIN_CONTRAST_PER_NOISE * state.scene.noise)
     })
+}
+
+/// The target where the changes since the first frame say that it is, if it was found elsewhere: its speed is
+/// not known yet, and gradient steps from rest may lead to the wrong side of a rough background.
+fn locate_displaced(state: &State, frame: &Frame<f64>, plain: Option<&Finding>) -> Option<Finding> {
+    let initial = state.initial.as_ref().filter(|_| crate::ablation::keeps("gradient.start_drift"))?;
+    let (first, moved) = (initial.bounds.centre(), initial.moved()?);
+    let there = [first[0] + moved[0], first[1] + moved[1]];
+    let is_there = |found: &Finding| {
+        let at = state.position(&found.aligned.pose);
+        (at[0] - there[0]).hypot(at[1] - there[1]) <= WHOLE_PIXEL_TOLERANCE
+    };
+    if plain.is_some_and(is_there) {
+        return None;
+    }
+    let how = (state.motion_model, VoteMask::None, [DISPLACEMENT_STD, PRIOR[1]], &LEVELS[2..]);
+    let found = try_at(state, frame, &state.placed(state.motion.pose, there), how)?;
+    let least = plain.map_or(1.0, |plain| plain.score.visibility - MIN_VISIBILITY_LOSS).min(MIN_VISIBILITY_TO_LEARN);
+    (is_there(&found) && found.score.visibility >= least).then_some(found)
 }
 
 /// Whether what was found is only what is left of a target that was covered or not seen in the frame

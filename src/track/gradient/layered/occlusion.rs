@@ -1,8 +1,8 @@
 //! Targets that a known surface covers in part, or begins to cover.
 
 use super::finding::{
-    COVERED, DOUBTED_INNOVATION, Finding, LEVELS, MAX_ADJACENT_SHARE, MIN_VISIBILITY_LOSS, PRIOR, SETTLING_FRAMES,
-    try_at,
+    COVERED, DOUBTED_INNOVATION, Finding, LEVELS, MAX_ADJACENT_SHARE, MIN_CONTRAST_PER_NOISE, MIN_VISIBILITY_LOSS,
+    PRIOR, SETTLING_FRAMES, try_at,
 };
 use super::score::Score;
 use super::state::State;
@@ -18,6 +18,24 @@ pub(super) const SLIGHT: f64 = 0.03;
 pub(super) const STRIP: f64 = 1.25;
 /// Distance of two poses that a covered edge makes, px.
 pub(super) const HELD_BACK: f64 = 0.5;
+
+/// Least visibility of a target that is known to be hidden in part.
+const MIN_EMERGING_VISIBILITY: f64 = 0.1;
+
+/// Whether an object hides the part of the target that it hid in the first frame: that part was never seen.
+pub(super) fn is_emerging(state: &State) -> bool {
+    state.history.occluded && state.target.fresh.is_some() && crate::ablation::keeps("gradient.emerging")
+}
+
+/// A target that emerges: it is as large as the first box, and only its position is looked for.
+pub(super) fn locate_emerging(state: &State, frame: &Frame<f64>) -> Option<Finding> {
+    let how = (MotionModel::Translation, VoteMask::Occluded, PRIOR, &LEVELS[1..]);
+    let found = try_at(state, frame, &state.expected(), how)?;
+    let whole = found.score.visibility > 1.0 - if is_large(state) { SLIGHT } else { MIN_VISIBILITY_LOSS };
+    let seen = found.score.visibility >= MIN_EMERGING_VISIBILITY
+        && found.score.contrast >= MIN_CONTRAST_PER_NOISE * state.scene.noise;
+    seen.then_some(Finding { occluded: !whole, reason: if whole { "" } else { COVERED }, ..found })
+}
 
 /// A known surface covers the target: only its position is looked for, where it is not covered.
 pub(super) fn locate_occluded(

@@ -2,7 +2,7 @@
 //! all the same, but is not known yet, and what hides it is known.
 
 use super::finding::SETTLING_FRAMES;
-use super::initial::InitialSegmentation;
+use super::initial::{InitialSegmentation, WHOLE_PIXEL_TOLERANCE};
 use super::layers::{Background, PRIOR, Target, UNSEEN, grown, holds};
 use super::learn::{CONTINUED, SOLID};
 use super::occluder::{HiddenPart, find_occluder};
@@ -15,8 +15,6 @@ use crate::types::{Frame, TargetBox};
 
 /// Variance of the displacement since the first frame, which is in whole pixels, px^2.
 const WHOLE_PIXEL_VARIANCE: f64 = 0.5;
-/// Difference of displacements that whole pixels, and what is behind the target, may make, px.
-const WHOLE_PIXEL_TOLERANCE: f64 = 2.0;
 /// Deviation of the middle of what moved, whose sides are known to a pixel, px.
 const CENTER_STD: f64 = 0.6;
 /// Change in still places that noise does not make, over the noise.
