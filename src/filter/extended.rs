@@ -52,9 +52,6 @@ impl ExtendedFilter {
 
     /// As [`predict`](Self::predict), with the Jacobian by central differences: one more call of `fx` with `2
     /// n` rows for each state.
-    ///
-    /// # Errors
-    /// As [`predict`](Self::predict).
     pub fn predict_by_differences(&mut self, mut fx: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<()> {
         self.check()?;
         let f = self.differences(self.dim_x, &mut fx)?;
@@ -99,9 +96,6 @@ impl ExtendedFilter {
     }
 
     /// As [`update`](Self::update), with the Jacobian by central differences.
-    ///
-    /// # Errors
-    /// As [`update`](Self::update).
     pub fn update_by_differences(
         &mut self,
         z: &[f64],

@@ -43,9 +43,4 @@ impl Preprocess {
         }
         frame
     }
-
-    /// Changes nothing.
-    pub fn is_identity(&self) -> bool {
-        self.quantise.is_none() && self.smooth.is_none()
-    }
 }

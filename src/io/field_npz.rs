@@ -230,9 +230,6 @@ pub fn read_npz<T: Real>(path: impl AsRef<Path>) -> Result<StoredField<T>> {
 }
 
 /// As [`read_npz`], from an open archive.
-///
-/// # Errors
-/// As [`read_npz`].
 pub fn read_npz_from<T: Real, R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<StoredField<T>> {
     let text = npz.text("metadata")?;
     let metadata: Metadata =

@@ -24,7 +24,6 @@ mod picture_sequence;
 mod sink;
 mod source;
 mod table;
-mod text_boxes;
 mod track_table;
 pub mod write;
 mod ycbcr;
@@ -49,5 +48,4 @@ pub use source::{
     ViewPairs, Y4mSource, kind_of, open, open_colour,
 };
 pub use table::{FieldTable, TableWriter, cell};
-pub use text_boxes::read_otb;
 pub use track_table::TrackTable;

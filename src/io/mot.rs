@@ -8,10 +8,16 @@
 //! Tracking", 2016.
 
 use super::table::{TableWriter, table_endings};
-use super::text_boxes::{FIRST_PIXEL, numbers};
 use crate::error::{Error, Result};
 use crate::types::{TargetBox, TrackState, TrackStatus};
 use std::path::Path;
+
+/// From a side of our boxes, where pixel 0 reaches from -1/2 to 1/2, to the number of the first pixel counted
+/// from 1.
+const FIRST_PIXEL: f64 = 1.5;
+
+/// Longest text that is read, bytes: hours of boxes.
+const LONGEST: u64 = 256 << 20;
 
 /// Writes boxes in the form of the MOT challenge, in thousandths of a pixel, to a file that appears when it
 /// is finished or to standard output.
@@ -22,9 +28,6 @@ pub struct MotTable {
 
 impl MotTable {
     /// Begins a file, or standard output for `-`.
-    ///
-    /// # Errors
-    /// As [`TableWriter::create`].
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         Ok(Self { table: TableWriter::create_without_header(path, 10)? })
     }
@@ -102,4 +105,24 @@ fn mot_box(values: &[f64]) -> Option<MotBox> {
         bounds: TargetBox { x: x - FIRST_PIXEL, y: y - FIRST_PIXEL, width, height },
         confidence: rest.first().copied().unwrap_or(1.0),
     })
+}
+
+/// The numbers of each line that is not blank, with the line's number (from 1).
+fn numbers(path: &Path) -> Result<Vec<(usize, Vec<f64>)>> {
+    let length = path.metadata().map_err(|e| Error::io(path, e))?.len();
+    if length > LONGEST {
+        return Err(Error::format(path, format!("{length} bytes; expected a text of boxes, at most {LONGEST}")));
+    }
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+    let text = std::str::from_utf8(&bytes).map_err(|_| Error::format(path, "not a text of boxes"))?;
+    let text = text.trim_start_matches('\u{feff}');
+    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+    lines
+        .map(|(index, line)| {
+            let words = line.split([',', ';', ' ', '\t']).filter(|word| !word.is_empty());
+            let values: std::result::Result<_, _> = words.map(|word| word.trim().parse::<f64>()).collect();
+            let values = values.map_err(|_| Error::format(path, format!("line {}: expected numbers", index + 1)))?;
+            Ok((index + 1, values))
+        })
+        .collect()
 }

@@ -110,9 +110,6 @@ impl NpyHeader {
 
     /// Writes the header, version 1.0, padded so that the data start at a multiple of 64 and, when `reserve`
     /// is larger than needed, at byte `reserve`.
-    ///
-    /// # Errors
-    /// Those of `out`.
     pub fn write(&self, out: &mut impl Write, reserve: usize) -> io::Result<()> {
         let axes: Vec<String> = self.shape.iter().map(|n| format!("{n},")).collect();
         let order = if self.fortran_order { "True" } else { "False" };

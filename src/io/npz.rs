@@ -24,9 +24,6 @@ pub struct NpzWriter<W: Write + Seek> {
 
 impl NpzWriter<AtomicFile> {
     /// A file that appears under its name when [`NpzWriter::finish`] is called.
-    ///
-    /// # Errors
-    /// As [`AtomicFile::create`].
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         Ok(Self::new(AtomicFile::create(path)?, path))
@@ -175,9 +172,6 @@ impl<R: Read + Seek> NpzReader<R> {
     }
 
     /// The array `name` of float32 or float64, in working precision.
-    ///
-    /// # Errors
-    /// As [`NpzReader::array`].
     pub fn real_array<T: Real>(&mut self, name: &str) -> Result<NpyArray<T>> {
         let (header, bytes) = self.read(name)?;
         match header.element {

@@ -32,9 +32,6 @@ pub fn write_frame_png(path: impl AsRef<Path>, frame: &AnyFrame) -> Result<()> {
 }
 
 /// Writes a colour frame as an RGB PNG: 8 bit for uint8, 16 bit for uint16.
-///
-/// # Errors
-/// As [`write_frame_png`].
 pub fn write_colour_png(path: impl AsRef<Path>, frame: &AnyColourFrame) -> Result<()> {
     let path = path.as_ref();
     match frame {

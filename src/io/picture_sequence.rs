@@ -53,17 +53,11 @@ impl SequenceWriter {
     }
 
     /// Gives the file its name.
-    ///
-    /// # Errors
-    /// As [`AtomicFile::commit`].
     pub fn finish(self) -> Result<()> {
         self.file.commit()
     }
 
     /// As [`SequenceWriter::finish`], under another name in the same folder.
-    ///
-    /// # Errors
-    /// As [`AtomicFile::commit`].
     pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
         self.file.commit_as(path)
     }

@@ -44,9 +44,6 @@ impl std::fmt::Debug for TableWriter {
 
 impl TableWriter {
     /// Begins a table in a file, or on standard output for `-`.
-    ///
-    /// # Errors
-    /// As [`AtomicFile::create`].
     pub fn create<S: AsRef<str>>(path: impl AsRef<Path>, header: &[S]) -> Result<Self> {
         let mut table = Self::create_without_header(path, header.len())?;
         table.row(header.iter().map(AsRef::as_ref))?;
@@ -54,25 +51,12 @@ impl TableWriter {
     }
 
     /// The same without a header, for rows of so many columns.
-    ///
-    /// # Errors
-    /// As [`AtomicFile::create`].
     pub fn create_without_header(path: impl AsRef<Path>, columns: usize) -> Result<Self> {
         let path = path.as_ref();
         if path == Path::new("-") {
             return Ok(Self::new(Target::Stream(Box::new(std::io::stdout())), "standard output".into(), columns));
         }
         Ok(Self::new(Target::File(AtomicFile::create(path)?), path.to_path_buf(), columns))
-    }
-
-    /// Begins a table on any stream; `name` stands for it in messages.
-    ///
-    /// # Errors
-    /// [`Error::Io`] when the header cannot be written.
-    pub fn on_stream<S: AsRef<str>>(stream: Box<dyn Write + Send>, name: &str, header: &[S]) -> Result<Self> {
-        let mut table = Self::new(Target::Stream(stream), name.into(), header.len());
-        table.row(header.iter().map(AsRef::as_ref))?;
-        Ok(table)
     }
 
     fn new(target: Target, path: PathBuf, columns: usize) -> Self {
@@ -112,9 +96,6 @@ impl TableWriter {
 
     /// As [`TableWriter::finish`], under another name in the same folder: for the rows that an interrupted
     /// run has got so far.
-    ///
-    /// # Errors
-    /// As [`TableWriter::finish`].
     pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
         self.end(Some(path.as_ref()))
     }
@@ -148,6 +129,30 @@ pub fn cell<T: Real>(value: T) -> String {
     if wide.is_nan() { "nan".into() } else { value.to_string() }
 }
 
+/// How tables that wrap a [`TableWriter`] in their field `table` end.
+macro_rules! table_endings {
+    ($table:ty) => {
+        impl $table {
+            /// As [`TableWriter::flush`](crate::io::TableWriter::flush).
+            pub fn flush(&mut self) -> Result<()> {
+                self.table.flush()
+            }
+
+            /// Ends the table and gives the file its name, as
+            /// [`TableWriter::finish`](crate::io::TableWriter::finish).
+            pub fn finish(self) -> Result<()> {
+                self.table.finish()
+            }
+
+            /// As [`TableWriter::finish_as`](crate::io::TableWriter::finish_as).
+            pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
+                self.table.finish_as(path)
+            }
+        }
+    };
+}
+pub(in crate::io) use table_endings;
+
 /// One row a site: frame, x, y, status, the motion parameters, and the standard deviation of each where the
 /// field has covariance.
 #[derive(Debug)]
@@ -159,9 +164,6 @@ pub struct FieldTable {
 
 impl FieldTable {
     /// Begins a table for fields of this layout.
-    ///
-    /// # Errors
-    /// As [`TableWriter::create`].
     pub fn create(path: impl AsRef<Path>, layout: &FieldLayout, covariance: bool) -> Result<Self> {
         let mut header: Vec<String> = ["frame", "x", "y", "status"].map(String::from).to_vec();
         header.extend(layout.parameters.iter().cloned());
@@ -201,61 +203,6 @@ impl FieldTable {
         }
         Ok(())
     }
-
-    /// Ends the table and gives the file its name.
-    ///
-    /// # Errors
-    /// As [`TableWriter::finish`].
-    pub fn finish(self) -> Result<()> {
-        self.table.finish()
-    }
-
-    /// As [`TableWriter::finish_as`].
-    ///
-    /// # Errors
-    /// As [`TableWriter::finish_as`].
-    pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
-        self.table.finish_as(path)
-    }
-
-    /// As [`TableWriter::flush`].
-    ///
-    /// # Errors
-    /// As [`TableWriter::flush`].
-    pub fn flush(&mut self) -> Result<()> {
-        self.table.flush()
-    }
 }
 
-/// How tables that wrap a [`TableWriter`] in their field `table` end.
-macro_rules! table_endings {
-    ($table:ty) => {
-        impl $table {
-            /// As [`TableWriter::flush`](crate::io::TableWriter::flush).
-            ///
-            /// # Errors
-            /// As there.
-            pub fn flush(&mut self) -> Result<()> {
-                self.table.flush()
-            }
-
-            /// Ends the table and gives the file its name, as
-            /// [`TableWriter::finish`](crate::io::TableWriter::finish).
-            ///
-            /// # Errors
-            /// As there.
-            pub fn finish(self) -> Result<()> {
-                self.table.finish()
-            }
-
-            /// As [`TableWriter::finish_as`](crate::io::TableWriter::finish_as).
-            ///
-            /// # Errors
-            /// As there.
-            pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
-                self.table.finish_as(path)
-            }
-        }
-    };
-}
-pub(in crate::io) use table_endings;
+table_endings!(FieldTable);

@@ -75,17 +75,11 @@ impl TrackTable {
     }
 
     /// Begins a table in a file, or on standard output for `-`.
-    ///
-    /// # Errors
-    /// As [`TableWriter::create`].
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         Ok(Self { table: TableWriter::create(path, &Self::columns())? })
     }
 
     /// As [`TrackTable::create`], with further columns after the others.
-    ///
-    /// # Errors
-    /// As [`TableWriter::create`].
     pub fn create_with(path: impl AsRef<Path>, further: &[&str]) -> Result<Self> {
         let columns: Vec<String> = Self::columns().into_iter().chain(further.iter().map(ToString::to_string)).collect();
         Ok(Self { table: TableWriter::create(path, &columns)? })
@@ -101,9 +95,6 @@ impl TrackTable {
     }
 
     /// As [`TrackTable::write`], with a cell for each further column.
-    ///
-    /// # Errors
-    /// As [`TrackTable::write`].
     pub fn write_with(
         &mut self,
         target: usize,

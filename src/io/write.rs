@@ -160,9 +160,6 @@ impl AtomicFile {
 impl AtomicFile {
     /// As [`AtomicFile::commit`], under another name in the same folder: for what an interrupted run has got
     /// so far.
-    ///
-    /// # Errors
-    /// As [`AtomicFile::commit`].
     pub fn commit_as(mut self, path: impl AsRef<Path>) -> Result<()> {
         self.target = path.as_ref().to_path_buf();
         self.commit()
@@ -207,9 +204,6 @@ impl Seek for Inner {
 
 /// Writes a whole file: `write` fills it, then it gets its name. On an error nothing is left behind and what
 /// was there before is kept.
-///
-/// # Errors
-/// Those of `write`, or [`Error::Io`] with `path`.
 pub fn atomic<R>(path: impl AsRef<Path>, write: impl FnOnce(&mut AtomicFile) -> Result<R>) -> Result<R> {
     let mut file = AtomicFile::create(path)?;
     let result = write(&mut file)?;

@@ -29,6 +29,3 @@ pub use planes::JetPlanes;
 pub(crate) use rows::{JetRows, starts};
 pub use stencil::{JetStencil, Reach};
 pub use time::{JetRates, TimeScheme};
-
-/// Names of the jet's components, in their order everywhere in this crate.
-pub const JET_NAMES: [&str; 6] = ["I", "Ix", "Iy", "Ixx", "Ixy", "Iyy"];

@@ -149,9 +149,6 @@ impl Posterior {
     }
 
     /// The component that each point belongs to: the one with the greatest share.
-    ///
-    /// # Errors
-    /// As [`Posterior::responsibilities`].
     pub fn labels(&self, points: &Points) -> Result<Vec<u32>> {
         let shares = self.responsibilities(points)?;
         let largest = |row: &[f64]| (0..row.len()).fold(0, |best, k| if row[k] > row[best] { k } else { best });
@@ -159,9 +156,6 @@ impl Posterior {
     }
 
     /// `ln sum_k rho_nk` of the points (N) by (14), and [`Posterior::responsibilities`].
-    ///
-    /// # Errors
-    /// As [`Posterior::responsibilities`].
     pub fn log_densities(&self, points: &Points) -> Result<(Vec<f64>, Vec<f64>)> {
         points.check_values()?;
         self.check(points.dimensions)?;

@@ -54,9 +54,6 @@ impl Prior {
     }
 
     /// `freedom`: how the caller calls the degrees of freedom.
-    ///
-    /// # Errors
-    /// As [`Prior::resolve`].
     pub(super) fn check(&self, dimensions: usize, freedom: &'static str) -> Result<()> {
         if self.mean.len() != dimensions || self.mean.iter().any(|m| !m.is_finite() || m.abs() > LARGEST) {
             let got = format!("{:?}", self.mean);

@@ -99,9 +99,6 @@ pub struct FirstFrame {
 
 /// Looks at the first frame of `source` without losing it: what it is (`None`: no frame at all), and the
 /// whole source again.
-///
-/// # Errors
-/// Those of the source.
 pub fn peek<F: FrameFormat>(
     mut source: Box<dyn FrameSource<F>>,
 ) -> Result<(Option<FirstFrame>, Box<dyn FrameSource<F>>)> {

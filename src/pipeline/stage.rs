@@ -19,9 +19,6 @@ pub trait Stage<T>: Send {
     /// Takes the next frame; gives a field once enough frames have come.
     ///
     /// The field's `frame_index` counts pushed frames from 0.
-    ///
-    /// # Errors
-    /// Those of the estimator or filter.
     fn push(&mut self, frame: AnyFrame) -> Result<Option<Output<T>>>;
     /// How often a filter had to restart a pixel.
     fn repairs(&self) -> usize {

@@ -89,9 +89,6 @@ impl Level {
 
     /// `choice`, after making sure that without one the environment does not ask for nonsense: a mistake
     /// there must not go unnoticed.
-    ///
-    /// # Errors
-    /// As [`Level::from_environment`].
     pub fn check(choice: Option<Self>) -> Result<Option<Self>> {
         if choice.is_none() {
             Self::from_environment()?;

@@ -20,6 +20,19 @@ const BIASED_F64: f64 = 4_503_599_627_371_519.0;
 /// Round towards minus infinity, without a flag for inexact results.
 const FLOOR: i32 = _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC;
 
+macro_rules! operators {
+    ($name:ident: $($operator:ident $function:ident $instruction:ident),*) => {$(
+        impl $operator for $name {
+            type Output = Self;
+            #[inline(always)]
+            fn $function(self, other: Self) -> Self {
+                // SAFETY: see the module's note.
+                Self(unsafe { $instruction(self.0, other.0) })
+            }
+        }
+    )*};
+}
+
 macro_rules! lanes {
     (
         $name:ident, $vector:ty, $scalar:ty, $count:literal, $mask:ty,
@@ -31,38 +44,7 @@ macro_rules! lanes {
         #[derive(Clone, Copy)]
         pub(crate) struct $name($vector);
 
-        impl Add for $name {
-            type Output = Self;
-            #[inline(always)]
-            fn add(self, other: Self) -> Self {
-                // SAFETY: see the module's note.
-                Self(unsafe { $add(self.0, other.0) })
-            }
-        }
-        impl Sub for $name {
-            type Output = Self;
-            #[inline(always)]
-            fn sub(self, other: Self) -> Self {
-                // SAFETY: see the module's note.
-                Self(unsafe { $sub(self.0, other.0) })
-            }
-        }
-        impl Mul for $name {
-            type Output = Self;
-            #[inline(always)]
-            fn mul(self, other: Self) -> Self {
-                // SAFETY: see the module's note.
-                Self(unsafe { $mul(self.0, other.0) })
-            }
-        }
-        impl Div for $name {
-            type Output = Self;
-            #[inline(always)]
-            fn div(self, other: Self) -> Self {
-                // SAFETY: see the module's note.
-                Self(unsafe { $div(self.0, other.0) })
-            }
-        }
+        operators!($name: Add add $add, Sub sub $sub, Mul mul $mul, Div div $div);
         impl Neg for $name {
             type Output = Self;
             #[inline(always)]
@@ -150,99 +132,43 @@ macro_rules! lanes {
     };
 }
 
-lanes!(
-    F32x8,
-    __m256,
-    f32,
-    8,
-    __m256,
-    _mm256_set1_ps,
-    _mm256_loadu_ps,
-    _mm256_storeu_ps,
-    _mm256_add_ps,
-    _mm256_sub_ps,
-    _mm256_mul_ps,
-    _mm256_div_ps,
-    _mm256_fmadd_ps,
-    _mm256_fnmadd_ps,
-    _mm256_sqrt_ps,
-    _mm256_min_ps,
-    _mm256_max_ps,
+lanes! {
+    F32x8, __m256, f32, 8, __m256,
+    _mm256_set1_ps, _mm256_loadu_ps, _mm256_storeu_ps, _mm256_add_ps, _mm256_sub_ps, _mm256_mul_ps, _mm256_div_ps,
+    _mm256_fmadd_ps, _mm256_fnmadd_ps, _mm256_sqrt_ps, _mm256_min_ps, _mm256_max_ps,
     |a, b| _mm256_cmp_ps::<_CMP_LT_OQ>(a, b),
     |m, y, n| _mm256_blendv_ps(n, y, m),
     |a| _mm256_floor_ps(a),
     |a| _mm256_castsi256_ps(_mm256_slli_epi32::<23>(_mm256_castps_si256(_mm256_add_ps(a, _mm256_set1_ps(BIASED_F32))))),
     patches::f32x8
-);
-lanes!(
-    F64x4,
-    __m256d,
-    f64,
-    4,
-    __m256d,
-    _mm256_set1_pd,
-    _mm256_loadu_pd,
-    _mm256_storeu_pd,
-    _mm256_add_pd,
-    _mm256_sub_pd,
-    _mm256_mul_pd,
-    _mm256_div_pd,
-    _mm256_fmadd_pd,
-    _mm256_fnmadd_pd,
-    _mm256_sqrt_pd,
-    _mm256_min_pd,
-    _mm256_max_pd,
+}
+lanes! {
+    F64x4, __m256d, f64, 4, __m256d,
+    _mm256_set1_pd, _mm256_loadu_pd, _mm256_storeu_pd, _mm256_add_pd, _mm256_sub_pd, _mm256_mul_pd, _mm256_div_pd,
+    _mm256_fmadd_pd, _mm256_fnmadd_pd, _mm256_sqrt_pd, _mm256_min_pd, _mm256_max_pd,
     |a, b| _mm256_cmp_pd::<_CMP_LT_OQ>(a, b),
     |m, y, n| _mm256_blendv_pd(n, y, m),
     |a| _mm256_floor_pd(a),
     |a| _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(_mm256_add_pd(a, _mm256_set1_pd(BIASED_F64))))),
     patches::f64x4
-);
-lanes!(
-    F32x16,
-    __m512,
-    f32,
-    16,
-    __mmask16,
-    _mm512_set1_ps,
-    _mm512_loadu_ps,
-    _mm512_storeu_ps,
-    _mm512_add_ps,
-    _mm512_sub_ps,
-    _mm512_mul_ps,
-    _mm512_div_ps,
-    _mm512_fmadd_ps,
-    _mm512_fnmadd_ps,
-    _mm512_sqrt_ps,
-    _mm512_min_ps,
-    _mm512_max_ps,
+}
+lanes! {
+    F32x16, __m512, f32, 16, __mmask16,
+    _mm512_set1_ps, _mm512_loadu_ps, _mm512_storeu_ps, _mm512_add_ps, _mm512_sub_ps, _mm512_mul_ps, _mm512_div_ps,
+    _mm512_fmadd_ps, _mm512_fnmadd_ps, _mm512_sqrt_ps, _mm512_min_ps, _mm512_max_ps,
     |a, b| _mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b),
     |m, y, n| _mm512_mask_blend_ps(m, n, y),
     |a| _mm512_roundscale_ps::<FLOOR>(a),
     |a| _mm512_castsi512_ps(_mm512_slli_epi32::<23>(_mm512_castps_si512(_mm512_add_ps(a, _mm512_set1_ps(BIASED_F32))))),
     patches::f32x16
-);
-lanes!(
-    F64x8,
-    __m512d,
-    f64,
-    8,
-    __mmask8,
-    _mm512_set1_pd,
-    _mm512_loadu_pd,
-    _mm512_storeu_pd,
-    _mm512_add_pd,
-    _mm512_sub_pd,
-    _mm512_mul_pd,
-    _mm512_div_pd,
-    _mm512_fmadd_pd,
-    _mm512_fnmadd_pd,
-    _mm512_sqrt_pd,
-    _mm512_min_pd,
-    _mm512_max_pd,
+}
+lanes! {
+    F64x8, __m512d, f64, 8, __mmask8,
+    _mm512_set1_pd, _mm512_loadu_pd, _mm512_storeu_pd, _mm512_add_pd, _mm512_sub_pd, _mm512_mul_pd, _mm512_div_pd,
+    _mm512_fmadd_pd, _mm512_fnmadd_pd, _mm512_sqrt_pd, _mm512_min_pd, _mm512_max_pd,
     |a, b| _mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b),
     |m, y, n| _mm512_mask_blend_pd(m, n, y),
     |a| _mm512_roundscale_pd::<FLOOR>(a),
     |a| _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(_mm512_add_pd(a, _mm512_set1_pd(BIASED_F64))))),
     patches::f64x8
-);
+}

@@ -47,17 +47,11 @@ const MIN_SLOPE_SQUARES: f64 = 4.0;
 /// x 9 windows round edge pixels, weighted by `1 / (1 + (r / 2 s)^2)^2`, r a window's residual and s the
 /// median of all. `row_offset`, `prior` and the method of the options are not looked at. Identical for any
 /// number of threads.
-///
-/// # Errors
-/// As [`edge_disparity`](super::edge_disparity).
 pub fn estimate_row_offset(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> Result<f64> {
     find_row_offset(left, right, options).map(|found| found.rows)
 }
 
 /// As [`estimate_row_offset`], with its reliability.
-///
-/// # Errors
-/// As [`edge_disparity`](super::edge_disparity).
 pub fn find_row_offset(left: &Frame<f32>, right: &Frame<f32>, options: &EdgeDisparityOptions) -> Result<RowOffset> {
     options.check_views(left, right)?;
     Ok(options.threads.install(|| {

@@ -40,9 +40,6 @@ impl SequenceRows {
     /// enough windows for vertical steps and three tenths of the edge pixels matched. It is estimated again
     /// where a later pair is matched worse, or a vertical step exceeds a fifth of a row. Pairs with too few
     /// edges change nothing. [`Method::Classes`] searches the rows at every pixel unless given.
-    ///
-    /// # Errors
-    /// As [`edge_disparity`].
     pub fn match_next(
         &mut self,
         left: &Frame<f32>,

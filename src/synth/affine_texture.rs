@@ -28,9 +28,6 @@ impl AffineTexture {
 
     /// The settings that the estimators' accuracy is quoted for: `M = [[0.01, -0.02], [0.02, 0.01]]`, `(u, v)
     /// = (0.3, -0.2)` at the centre, noise filtered by 2 px with a standard deviation of 40 grey levels.
-    ///
-    /// # Errors
-    /// As [`AffineTexture::moving`].
     pub fn reference(width: usize, height: usize, seed: u64) -> Result<Self> {
         Self::moving((width, height), [0.3, -0.2, 0.01, 0.02, -0.02, 0.01], seed)
     }

@@ -120,9 +120,6 @@ impl AnyFlowFilter {
 
     /// Width and height of the field, and the means (12 numbers) of its sites; NaN where there is no filter.
     /// `None` before the first frame.
-    ///
-    /// # Errors
-    /// Those of [`SamplingGrid::shape`](crate::types::SamplingGrid::shape).
     pub fn means(&self) -> Result<Option<SiteValues>> {
         each!(&self.filter, filter => {
             let values = (0..filter.len()).flat_map(|site| filter.state(site).map_or([f64::NAN; 12], |(mean, _)| mean));
@@ -131,9 +128,6 @@ impl AnyFlowFilter {
     }
 
     /// As [`means`](Self::means): the covariances (12 x 12 numbers) of the sites.
-    ///
-    /// # Errors
-    /// As [`means`](Self::means).
     pub fn covariances(&self) -> Result<Option<SiteValues>> {
         each!(&self.filter, filter => {
             let none = [[f64::NAN; 12]; 12];
@@ -167,17 +161,11 @@ impl AnyFlowFilter {
 
     /// The state as bytes, with the sample type of its frames (empty: unknown); `None` before the first
     /// frame.
-    ///
-    /// # Errors
-    /// Those of [`FlowFilter::to_bytes`].
     pub fn to_bytes(&self) -> Result<Option<(Vec<u8>, &'static str)>> {
         each!(&self.filter, filter => Ok(Some((filter.to_bytes()?, self.dtype.unwrap_or_default()))), Ok(None))
     }
 
     /// Replaces the state by that of [`to_bytes`](Self::to_bytes).
-    ///
-    /// # Errors
-    /// As [`load`](Self::load).
     pub fn restore(&mut self, bytes: &[u8], dtype: Option<&'static str>) -> Result<()> {
         let filter = if is_double(NpzReader::new(Cursor::new(bytes), "filter state")?)? {
             Filter::Double(FlowFilter::from_bytes(bytes)?)

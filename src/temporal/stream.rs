@@ -23,9 +23,6 @@ impl StreamPlan {
     /// Frames pass `preprocess` and `estimator`; with `recursive` the estimates are fused over time.
     ///
     /// A method that smooths frames itself gets them unsmoothed, because it reads their noise first.
-    ///
-    /// # Errors
-    /// Those of [`RecursiveFusion::new`].
     pub fn new(estimator: Estimator, mut preprocess: Preprocess, recursive: Option<RecursiveOptions>) -> Result<Self> {
         if estimator.method().info().smooths_frames {
             preprocess.smooth = None;
@@ -54,9 +51,6 @@ pub struct FlowStream<T: Real> {
 
 impl<T: SimdReal> FlowStream<T> {
     /// A stream without frames.
-    ///
-    /// # Errors
-    /// Those of [`RecursiveFusion::new`].
     pub fn new(plan: StreamPlan) -> Result<Self> {
         let fusion = plan.recursive.map(|options| RecursiveFusion::new(&plan.estimator, options)).transpose()?;
         Ok(Self { plan, fusion, frames: VecDeque::new(), pushed: 0 })

@@ -60,9 +60,6 @@ pub struct FlowField<T> {
 
 impl<T: Real> FlowField<T> {
     /// A field of NaN with status `Border`, to be filled by an estimator.
-    ///
-    /// # Errors
-    /// As [`SamplingGrid::shape`].
     pub fn empty(layout: FieldLayout, covariance: bool) -> Result<Self> {
         Self::of(layout, covariance, T::nan())
     }

@@ -81,11 +81,6 @@ impl SamplingGrid {
             Self::Points(points) => points[col],
         }
     }
-
-    /// Whether this is every pixel of the frame.
-    pub fn is_dense(&self) -> bool {
-        matches!(self, Self::Grid { region: None, stride: 1 })
-    }
 }
 
 #[cfg(test)]

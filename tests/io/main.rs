@@ -27,7 +27,6 @@ mod source_select;
 mod source_views;
 mod source_y4m;
 mod table;
-mod text_boxes;
 mod track_table;
 mod write;
 

@@ -43,7 +43,7 @@ fn lines_count_from_one_and_leave_out_who_is_gone() {
 fn truth_and_detections_are_read_and_damage_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("gt.txt");
-    std::fs::write(&path, "3, 2, 794.27, 247.59, 71.245, 174.88, 0, 1, 0.86\r\n\n1 -1 1 1 4 4\n").unwrap();
+    std::fs::write(&path, "\u{feff}3, 2, 794.27, 247.59, 71.245, 174.88, 0, 1, 0.86\r\n\n1 -1 1 1 4 4\n").unwrap();
     let read = read_mot(&path).unwrap();
     assert_eq!((read[0].frame, read[0].target, read[0].confidence), (2, 2, 0.0));
     assert_eq!((read[1].target, read[1].bounds.x, read[1].confidence), (-1, -0.5, 1.0));
@@ -55,5 +55,9 @@ fn truth_and_detections_are_read_and_damage_is_named() {
         assert!(matches!(error, Error::Format { .. }), "{error}");
         assert!(error.to_string().contains(&format!("line {line}")), "{damage:?}: {error}");
     }
+    std::fs::write(&path, [0xff, 0xfe, 0]).unwrap();
+    assert!(matches!(read_mot(&path), Err(Error::Format { .. })));
+    std::fs::write(&path, "1\t-1\t1\t1\t4;4").unwrap();
+    assert_eq!(read_mot(&path).unwrap(), read[1..]);
     assert!(matches!(read_mot(folder.path().join("none.txt")), Err(Error::Io { .. })));
 }

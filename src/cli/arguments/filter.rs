@@ -77,9 +77,6 @@ fn parse_twelve(text: &str) -> std::result::Result<Twelve, String> {
 
 impl FilterArguments {
     /// The constants for frames of samples of `dtype`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming the option with an unknown word.
     pub fn options(&self, dtype: &str) -> Result<FlowFilterOptions> {
         let mut options = FlowFilterOptions::profile(&self.profile)?;
         if let Some(form) = &self.form {

@@ -25,9 +25,6 @@ pub struct GridArguments {
 
 impl GridArguments {
     /// The sites these arguments ask for.
-    ///
-    /// # Errors
-    /// A points file that cannot be read or holds anything but pixels.
     pub fn sampling_grid(&self) -> Result<SamplingGrid> {
         if self.points.is_empty() {
             return Ok(SamplingGrid::Grid { region: self.region, stride: self.stride.unwrap_or(1) });

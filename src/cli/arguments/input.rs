@@ -36,9 +36,6 @@ impl SelectionArguments {
     }
 
     /// Refuses a range of frames that holds fewer than `min` of `what`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming `stop`.
     pub fn check_count(&self, min: usize, what: &str) -> Result<()> {
         match self.stop.map(|stop| stop.saturating_sub(self.start).div_ceil(self.step)) {
             Some(count) if count < min => Err(Error::argument("stop", format!("at least {min} {what}"), count)),

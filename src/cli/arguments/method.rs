@@ -86,9 +86,6 @@ pub fn rectangle((width, height): (usize, usize)) -> Neighbourhood {
 impl MethodArguments {
     /// The method with its options, for a sequence of `frames` frames (if known) that are to be smoothed by
     /// `smooth` px.
-    ///
-    /// # Errors
-    /// Those of [`MethodSettings::method`].
     pub fn method(&self, frames: Option<usize>, smooth: Option<f64>) -> Result<Method> {
         let method = word(&self.method);
         let is_pair = frames == Some(2) && MethodInfo::named(&method)?.takes_pairs();
@@ -111,9 +108,6 @@ impl MethodArguments {
     }
 
     /// Whether and how estimates are fused over time.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming `temporal` or `forgetting`.
     pub fn recursive(&self) -> Result<Option<RecursiveOptions>> {
         RecursiveOptions::parse(self.temporal.as_deref(), self.forgetting)
     }

@@ -48,9 +48,6 @@ impl ParticleTrackerArguments {
     }
 
     /// The options of the particle tracker.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming the option.
     pub fn options(&self, mode: ParticleMode, random_state: Option<u64>, threads: Threads) -> Result<ParticleOptions> {
         let mut options = ParticleOptions { mode, threads, ..ParticleOptions::default() };
         if let Some(particles) = self.particles {
@@ -69,10 +66,6 @@ impl ParticleTrackerArguments {
 
     /// Where targets start: `given` boxes in the first frame, numbered from 1, or those of the file.
     /// `frames`: how many come, if that is known.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] named `box` without any, `boxes` for both, or a file none of whose targets starts
-    /// in a frame that is read; those of [`read_mot`].
     pub fn starts(&self, given: &[TargetBox], numbering: Numbering, frames: Option<usize>) -> Result<Vec<TargetStart>> {
         match (&self.box_file, given) {
             (None, []) => Err(Error::argument("box", "a --box for each target, or --boxes FILE", "none")),

@@ -61,9 +61,6 @@ impl StereoTrackerArguments {
     }
 
     /// The options of the stereo tracker; layers of disparity as wide as the range.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming the option.
     pub fn options(
         &self,
         mode: StereoMode,
@@ -95,10 +92,6 @@ impl StereoTrackerArguments {
 
 impl StereoTrackerArguments {
     /// When the pairs were recorded, if given.
-    ///
-    /// # Errors
-    /// A file that cannot be read or has other lines; [`Error::Argument`] named `times` for times that do not
-    /// ascend.
     pub fn times(&self, numbering: Numbering) -> Result<Option<PairTimes>> {
         let Some(path) = &self.times else { return Ok(None) };
         let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;

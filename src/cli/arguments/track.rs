@@ -88,9 +88,6 @@ pub enum CameraWord {
 
 impl TrackerArguments {
     /// The method's name, one that is known.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] named `method`.
     pub fn method(&self) -> Result<&'static str> {
         let known = METHODS.iter().copied().find(|name| *name == self.method);
         known.ok_or_else(|| Error::argument("method", format!("one of {}", METHODS.join(", ")), &self.method))
@@ -102,9 +99,6 @@ impl TrackerArguments {
     }
 
     /// The options of the gradient tracker.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming the option.
     pub fn gradient(&self) -> Result<GradientOptions> {
         if self.mode.is_some() {
             return Err(Error::argument("mode", "no mode, which is for stereo and particle", "a mode with gradient"));

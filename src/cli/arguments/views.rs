@@ -34,9 +34,6 @@ pub struct LayoutArguments {
 
 impl LayoutArguments {
     /// Opens the pairs of views; also returns their numbering in the input.
-    ///
-    /// # Errors
-    /// Those of [`ViewPairs::open`].
     pub fn open(
         &self,
         input: &[String],

@@ -47,9 +47,6 @@ pub fn plane<T: Real>(field: &FlowField<T>, quantity: Quantity) -> Result<Vec<f6
 }
 
 /// As [`plane()`], with the plane of standard deviations where the field has a covariance.
-///
-/// # Errors
-/// As [`plane()`].
 pub fn planes<T: Real>(field: &FlowField<T>, quantity: Quantity) -> Result<(Vec<f64>, Option<Vec<f64>>)> {
     check(field, quantity)?;
     let pairs: Vec<(f64, Option<f64>)> = (0..field.len()).map(|i| at_site(field, quantity, i)).collect();

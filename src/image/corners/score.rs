@@ -31,9 +31,6 @@ pub fn corner_score(frame: &Frame<f32>, window: usize) -> Result<Frame<f32>> {
 }
 
 /// As [`corner_score`] at an instruction set, into a frame that is made anew only when it is of another size.
-///
-/// # Errors
-/// As [`corner_score`].
 pub fn corner_score_into(level: Level, frame: &Frame<f32>, window: usize, score: &mut Frame<f32>) -> Result<()> {
     if window.is_multiple_of(2) || window > MAX_WINDOW {
         return Err(Error::argument("window", format!("an odd integer from 1 to {MAX_WINDOW}"), window));

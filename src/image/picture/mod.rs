@@ -24,7 +24,7 @@ pub use diverging::{SignedMap, symmetric_range};
 pub use grey::{GreyRange, grey_picture};
 pub use overlay::{PathPoint, TrackColours, TrackOverlay, status_colour};
 pub use quiver::{Arrow, Quiver, arrows_on_grid};
-pub use wheel::{FlowColours, wheel_legend};
+pub use wheel::FlowColours;
 
 use crate::error::{Error, Result};
 use crate::math::nearest_quantile;

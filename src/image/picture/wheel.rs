@@ -64,17 +64,6 @@ impl FlowColours {
     }
 }
 
-/// A square picture of the wheel itself, `size` px wide: the colour at an offset from the middle is that of
-/// flow in that direction.
-pub fn wheel_legend(size: usize) -> Picture {
-    let (wheel, middle) = (wheel(), (size as f64 - 1.0) / 2.0);
-    let radius = (size as f64 / 2.0).max(1.0);
-    Picture::from_fn(size, size, |x, y| {
-        let (u, v) = ((x as f64 - middle) / radius, (y as f64 - middle) / radius);
-        if u.hypot(v) > 1.0 { [255; 3] } else { colour(&wheel, u, v).unwrap_or([255; 3]) }
-    })
-}
-
 /// The 55 hues, from red through yellow, green, cyan, blue and magenta.
 fn wheel() -> Vec<[f64; 3]> {
     let mut hues = Vec::with_capacity(55);

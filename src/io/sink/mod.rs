@@ -55,9 +55,6 @@ pub fn open_sink(spec: &str, frame_rate: f64) -> Result<Box<dyn FrameSink>> {
 }
 
 /// Opens a sink of colour frames by its specification, as [`open_sink`].
-///
-/// # Errors
-/// As [`open_sink`].
 pub fn open_colour_sink(spec: &str, frame_rate: f64) -> Result<Box<ColourSink>> {
     (kind_at_rate(spec, frame_rate)?.open_colour)(spec, frame_rate)
 }

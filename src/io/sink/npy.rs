@@ -28,9 +28,6 @@ pub struct NpySink {
 
 impl NpySink {
     /// Begins a stack.
-    ///
-    /// # Errors
-    /// As [`AtomicFile::create`].
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref().to_path_buf();
         let header = NpyHeader::new(ElementType::U8, &[0, 0, 0]);

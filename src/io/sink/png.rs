@@ -22,9 +22,6 @@ pub struct PngSink {
 
 impl PngSink {
     /// Files in `folder`, which is made when it does not exist.
-    ///
-    /// # Errors
-    /// As [`NumberedFiles::create`].
     pub fn create(folder: impl AsRef<Path>) -> Result<Self> {
         Ok(Self { files: NumberedFiles::create(folder, "frame", "png")?, next: 0, uniform: Uniform::default() })
     }

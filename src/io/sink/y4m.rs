@@ -49,9 +49,6 @@ impl Write for Output {
 
 impl Y4mSink {
     /// Begins a file, which appears under its name when it is finished.
-    ///
-    /// # Errors
-    /// As [`AtomicFile::create`].
     pub fn create(path: impl AsRef<Path>, frame_rate: f64) -> Result<Self> {
         let path = path.as_ref();
         Ok(Self::new(Output::File(AtomicFile::create(path)?), path.to_path_buf(), frame_rate))

@@ -43,9 +43,6 @@ struct Running {
 
 impl FfmpegSource {
     /// Opens a video with the `ffmpeg` on the `PATH`, its luma as grey frames.
-    ///
-    /// # Errors
-    /// As [`FfmpegSource::open_with`].
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
         Self::open_with("ffmpeg", path, Colour::Luminance)
     }

@@ -56,9 +56,6 @@ pub trait FrameSource<F = AnyFrame>: Send {
 
     /// Passes over up to `count` frames, without decoding them where the format allows it; returns how many
     /// there were.
-    ///
-    /// # Errors
-    /// As [`FrameSource::next_frame`].
     fn skip(&mut self, count: usize) -> Result<usize> {
         for done in 0..count {
             if self.next_frame()?.is_none() {
@@ -141,9 +138,6 @@ pub fn open(spec: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
 /// colour is `(T, H, W, 3)` or `(T, H, W, 4)`, one frame `(H, W, 3)` or `(H, W, 4)`. Alpha is left out. Grey
 /// pictures are an [`Error::Format`] that says that colour is needed, unless `options.grey` is
 /// [`Grey::Repeat`].
-///
-/// # Errors
-/// As [`open`].
 pub fn open_colour(spec: &str, options: &OpenOptions) -> Result<Box<ColourSource>> {
     let source = (kind_for(spec, options)?.open_colour)(spec, options.grey)?;
     Ok(Box::new(Selected::new(source, options)?))

@@ -42,9 +42,6 @@ impl Scorer {
     }
 
     /// `sum_k ln m_k` without `D F / 2 ln 2 pi`.
-    ///
-    /// # Errors
-    /// As [`Scorer::score`].
     pub fn gaussians(&self, moments: &Moments) -> Result<f64> {
         let posterior = Posterior::maximised(&self.prior, moments);
         let factors = Factors::of(&posterior)?;

@@ -21,10 +21,6 @@ pub struct ForegroundMaps {
 impl ForegroundMaps {
     /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a sequence of
     /// `frame_rate` frames per second that appears when it is finished.
-    ///
-    /// # Errors
-    /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and
-    /// [`SequenceWriter::create`](crate::io::SequenceWriter::create).
     pub fn create(path: impl AsRef<Path>, frame_rate: f64) -> Result<Self> {
         Ok(Self { album: Album::create(path.as_ref(), STEM, ARGUMENT, frame_rate)? })
     }

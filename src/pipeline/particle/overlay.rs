@@ -25,10 +25,6 @@ pub struct ParticleOverlays {
 impl ParticleOverlays {
     /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a sequence of
     /// `frame_rate` frames per second that appears when it is finished.
-    ///
-    /// # Errors
-    /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and
-    /// [`SequenceWriter::create`](crate::io::SequenceWriter::create).
     pub fn create(path: impl AsRef<Path>, overlay: TrackOverlay, frame_rate: f64) -> Result<Self> {
         let album = Album::create(path.as_ref(), STEM, "overlay", frame_rate)?;
         let overlay = TrackOverlay { colours: TrackColours::Target, ..overlay };

@@ -37,9 +37,6 @@ impl ParticleRows {
     }
 
     /// Begins the text.
-    ///
-    /// # Errors
-    /// As [`TrackTable::create`](crate::io::TrackTable::create).
     pub fn create(target: &TableTarget, format: TrackFormat) -> Result<Self> {
         Ok(Self { rows: RowWriter::create(target, format, &Self::COLUMNS)? })
     }

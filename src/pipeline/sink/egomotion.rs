@@ -89,9 +89,6 @@ pub struct Egomotion {
 
 impl Egomotion {
     /// Opens the tables.
-    ///
-    /// # Errors
-    /// As [`Table::create`].
     pub fn open(plan: EgomotionPlan) -> Result<Self> {
         let table = Table::create(&plan.target, &HEADER)?;
         let alternatives = plan.alternatives.as_ref().map(|target| Table::create(target, &ALTERNATIVES)).transpose()?;

@@ -25,9 +25,6 @@ pub struct Measurements {
 
 impl Measurements {
     /// Opens the table.
-    ///
-    /// # Errors
-    /// As [`Table::create`].
     pub fn open(target: &TableTarget, quantities: Vec<Quantity>) -> Result<Self> {
         Ok(Self { table: Table::create(target, &HEADER)?, quantities })
     }

@@ -48,9 +48,6 @@ pub struct Table {
 
 impl Table {
     /// Begins the table.
-    ///
-    /// # Errors
-    /// As [`TableWriter::create`].
     pub fn create(target: &TableTarget, header: &[&str]) -> Result<Self> {
         let writer = TableWriter::create_without_header(target.path(), header.len())?;
         let header = header.iter().map(ToString::to_string).collect();
@@ -71,9 +68,6 @@ impl Table {
     }
 
     /// Adds a row.
-    ///
-    /// # Errors
-    /// As [`TableWriter::row`].
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) -> Result<()> {
         self.begin()?;
         self.rows += 1;
@@ -81,9 +75,6 @@ impl Table {
     }
 
     /// Shows the rows so far to a reader of standard output.
-    ///
-    /// # Errors
-    /// As [`TableWriter::flush`].
     pub fn flush(&mut self) -> Result<()> {
         match (&self.target, &mut self.writer) {
             (TableTarget::StandardOutput, Some(writer)) => writer.flush(),
@@ -92,9 +83,6 @@ impl Table {
     }
 
     /// Gives the table its name, or what there is of it the partial one.
-    ///
-    /// # Errors
-    /// As [`TableWriter::finish`].
     pub fn finish(&mut self, ending: Ending) -> Result<()> {
         if ending == Ending::Complete {
             self.begin()?;

@@ -79,10 +79,6 @@ impl StereoOverlays {
     /// Pictures in a folder, which is made when it does not exist, or, by the name `*.y4m`, a sequence of
     /// `frame_rate` frames per second that appears when it is finished. Pictures are `enlargement` times as
     /// large as the views.
-    ///
-    /// # Errors
-    /// As [`NumberedFiles::create`](crate::io::NumberedFiles::create) and
-    /// [`SequenceWriter::create`](crate::io::SequenceWriter::create).
     pub fn create(path: &Path, kind: StereoPicture, enlargement: usize, frame_rate: f64) -> Result<Self> {
         let album = Album::create(path, kind.stem(), kind.argument(), frame_rate)?;
         Ok(Self { album, kind, enlargement, range: None })

@@ -44,9 +44,6 @@ impl GreyPairs {
 
     /// The next pair, after `done` of them; `None` after the last. `progress` is called at least once, and
     /// while there is none yet.
-    ///
-    /// # Errors
-    /// Those of the views and of `progress`.
     pub fn next(&mut self, done: usize, progress: &dyn Progress) -> Result<Option<GreyPair>> {
         progress.step(done, self.total)?;
         let Some(views) = self.pairs.next(|| progress.step(done, self.total))? else { return Ok(None) };

@@ -93,9 +93,6 @@ pub struct ClusterRows {
 
 impl ClusterRows {
     /// Begins the table.
-    ///
-    /// # Errors
-    /// As [`Table::create`].
     pub fn create(target: &TableTarget) -> Result<Self> {
         Ok(Self { table: Table::create(target, &COLUMNS)? })
     }

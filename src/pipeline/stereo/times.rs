@@ -42,9 +42,6 @@ impl PairTimes {
     }
 
     /// Time from one pair of the input to another, in ordinary steps.
-    ///
-    /// # Errors
-    /// As [`PairTimes::at`].
     pub fn steps(&self, from: usize, to: usize) -> Result<f64> {
         Ok((self.at(to)? - self.at(from)?) / self.ordinary)
     }

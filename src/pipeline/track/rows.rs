@@ -128,9 +128,6 @@ pub struct TrackRows {
 
 impl TrackRows {
     /// Begins the text.
-    ///
-    /// # Errors
-    /// As [`TrackTable::create`].
     pub fn create(target: &TableTarget, format: TrackFormat) -> Result<Self> {
         Ok(Self { rows: RowWriter::create(target, format, &[])? })
     }
