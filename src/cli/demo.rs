@@ -150,8 +150,7 @@ fn truth_name(index: usize) -> String {
     format!("truth_{index:06}.npz")
 }
 
-/// Whether a folder holds what an earlier (or stopped) run of this command left there, and nothing else: then
-/// the next run may replace it.
+/// Whether a folder holds only what an earlier run of this command left: then the next may replace it.
 fn is_own_work(folder: &Path) -> bool {
     let frames = |name: &str| (0..FRAMES).any(|k| name == format!("frame_{k:06}.png"));
     let results = |name: &str| {

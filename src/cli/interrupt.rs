@@ -1,5 +1,4 @@
-//! Ctrl-C: the first one stops the run after the current frame, the second ends the process at once,
-//! without its temporary files.
+//! Ctrl-C: the first stops the run after the current frame, the second ends the process at once.
 
 use crate::error::{Error, Result};
 use crate::io::write::remove_temporaries;

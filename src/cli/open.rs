@@ -88,8 +88,7 @@ pub fn compute(arguments: &ComputeArguments) -> Result<(Threads, Option<Level>)>
     ))
 }
 
-/// Whether to compute in double precision for frames of this type; `demanding` work does so by
-/// default.
+/// Whether to compute in double precision for frames of this type: by default if `demanding`.
 pub fn in_double(precision: Precision, first: &FirstFrame, demanding: bool) -> bool {
     (demanding && precision == Precision::Auto) || precision.is_double(first.dtype)
 }

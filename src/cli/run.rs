@@ -74,8 +74,7 @@ pub fn report(summary: &Summary, failure: Option<Error>, context: ReportContext<
     Report { summary: object, failure }
 }
 
-/// Where the results are: the requested place; of a run that was stopped the other name that one file has
-/// then, and nothing where it left none.
+/// Where the results are: the requested place; after a stopped run the partial file, if there is one.
 fn place<'a>(summary: &'a Summary, asked: Option<&'a Path>, complete: bool) -> Option<&'a Path> {
     let one_file = |asked: &&Path| *asked != Path::new("-") && !is_folder(asked);
     match asked.filter(one_file) {
@@ -115,8 +114,7 @@ pub fn input_details(opened: &Opened, grid: &GridArguments) -> Value {
     })
 }
 
-/// Where a table goes: to a `.csv` file that may be written, or to standard output, unless the report as JSON
-/// goes there.
+/// Where a table goes: a `.csv` file that may be written, or standard output unless JSON goes there.
 pub(super) fn table_target(output: Option<&Path>, force: bool, json: bool) -> Result<TableTarget> {
     match output {
         Some(path) if path != Path::new("-") => {

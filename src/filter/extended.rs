@@ -50,8 +50,7 @@ impl ExtendedFilter {
         self.state.propagate_covariance(&f)
     }
 
-    /// As [`predict`](Self::predict), with the Jacobian by central differences: one more call of `fx` with `2
-    /// n` rows for each state.
+    /// As [`predict`](Self::predict), with the Jacobian by central differences of `fx`.
     pub fn predict_by_differences(&mut self, mut fx: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<()> {
         self.check()?;
         let f = self.differences(self.dim_x, &mut fx)?;
@@ -61,8 +60,7 @@ impl ExtendedFilter {
         })
     }
 
-    /// Takes in the measurements `z` `(B, m)` through `hx` and its Jacobian; a state with a NaN among its
-    /// numbers is left as it is.
+    /// Takes in the measurements `z` `(B, m)` through `hx` and its Jacobian; NaN means no measurement.
     ///
     /// # Errors
     /// Those of the callbacks; [`Error::Argument`](crate::Error::Argument) as for `predict`;

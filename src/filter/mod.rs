@@ -1,5 +1,4 @@
-//! Filters without images: linear, extended and unscented Kalman filters and a particle filter, each over a
-//! batch of independent states.
+//! Linear, extended and unscented Kalman filters and a particle filter, over batches of states.
 //!
 //! Names follow the literature and `filterpy`: `x`, `P`, `Q`, `R`, [`predict`](UnscentedFilter::predict),
 //! [`update`](UnscentedFilter::update), residual `y`, its covariance `S`, gain `K`, `log_likelihood`. Every

@@ -9,8 +9,7 @@ use crate::error::{Error, Result};
 /// + lambda)` with `P = L L^T`. Weights: mean `lambda / (n + lambda)` and `1 / (2 (n + lambda))`; for the
 /// covariance the first one gains `1 - alpha^2 + beta`.
 ///
-/// The default, `alpha = 1, beta = 2, kappa = 0`, gives the points `x +- sqrt(n) column_k(L)` and, in the
-/// mean, no weight to the centre.
+/// By default the points are `x +- sqrt(n) column_k(L)`, and the centre has no weight in the mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SigmaPoints {

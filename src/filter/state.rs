@@ -5,8 +5,7 @@ use crate::math::dense::{
     cholesky, covariance_fault, factor, forward, mend, multiply, multiply_transposed, solve, symmetrise,
 };
 
-/// A batch of `B` independent Gaussian states with `n` dimensions, measured by `m` numbers each. Row-major
-/// arrays.
+/// A batch of `B` independent Gaussian states, `n` dimensions, `m` measured numbers; row-major arrays.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GaussianState {
@@ -63,8 +62,7 @@ impl GaussianState {
         })
     }
 
-    /// Checks the public arrays, which a caller may have replaced: sizes, and that they are means and
-    /// covariances.
+    /// Checks sizes and values of the public arrays, which a caller may have replaced.
     pub(super) fn check(&self) -> Result<()> {
         let (b, n, m) = (self.batch, self.dim_x, self.dim_z);
         expect("x", &self.x, &[b * n])?;
@@ -190,8 +188,7 @@ pub(crate) fn check_dimension(name: &'static str, n: usize) -> Result<()> {
     Err(Error::argument(name, format!("an integer from 1 to {LARGEST_DIMENSION}"), n))
 }
 
-/// Refuses a number of states for which there is no memory: about what an unscented step takes is asked for
-/// and given back.
+/// Refuses a number of states without the memory that an unscented step takes.
 fn check_batch(batch: usize, n: usize, m: usize) -> Result<()> {
     if batch == 0 {
         return Err(Error::argument("batch", "a positive integer", 0));

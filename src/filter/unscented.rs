@@ -89,8 +89,7 @@ impl UnscentedFilter {
         self.take_moments(sigmas, 2 * n, None)
     }
 
-    /// Takes in the measurements `z` `(B, m)` through `hx`; a state with a NaN among its numbers is left as
-    /// it is.
+    /// Takes in the measurements `z` `(B, m)` through `hx`; NaN means no measurement.
     ///
     /// # Errors
     /// Those of `hx`; [`Error::Argument`] for arrays of wrong length or results that are not finite;
@@ -120,8 +119,7 @@ impl UnscentedFilter {
             let x = &self.x[item * n..(item + 1) * n];
             let cross = weighted_product(measured, &mean, points, x, &wc);
             let mut spread = weighted_product(measured, &mean, measured, &mean, &wc);
-            // The measurement seen as linear: H = P_zx P^-1, with what H does not explain as additional
-            // noise.
+            // The measurement seen as linear: H = P_zx P^-1; what H does not explain is noise.
             let mut h = cross.clone();
             h.chunks_exact_mut(n).for_each(|row| solve(&factors[item * n * n..(item + 1) * n * n], n, row));
             for a in 0..m {
@@ -158,8 +156,7 @@ impl UnscentedFilter {
         out
     }
 
-    /// Sets `x` and `P` to the weighted moments of propagated points of `dims` dimensions, plus additive
-    /// noise.
+    /// Sets `x` and `P` to the weighted moments of propagated points (`dims`), plus additive noise.
     fn take_moments(&mut self, sigmas: Vec<f64>, dims: usize, noise: Option<&[f64]>) -> Result<()> {
         let n = self.dim_x;
         let rows = SigmaPoints::count(dims);

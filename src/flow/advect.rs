@@ -181,8 +181,7 @@ impl Between {
     }
 }
 
-/// The site at or before a position on an axis of `count` sites, and the remainder; the last site belongs to
-/// the cell before it.
+/// The cell of a position on an axis of `count` sites, and the remainder.
 fn cell(place: f64, count: usize) -> Option<(usize, f64)> {
     if count == 0 || !(place >= 0.0 && place <= (count - 1) as f64) {
         return None;

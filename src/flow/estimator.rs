@@ -11,8 +11,7 @@ use crate::error::{Error, Result};
 use crate::simd::{SimdReal, same, same_mut};
 use crate::types::{FieldLayout, FlowField, Frame};
 
-/// Maximum standard deviation of the noise in single precision, grey levels: beyond it, its square times
-/// counts overflows.
+/// Maximum standard deviation of the noise in single precision, grey levels: squares overflow.
 const MAX_SINGLE_NOISE: f64 = 1e12;
 
 /// A method made ready: options checked, stencils and kernels computed.
@@ -184,8 +183,7 @@ impl Estimator {
         Ok(())
     }
 
-    /// Calls the instance for the precision. Both are compiled here, once, and not again in every crate that
-    /// calls this function.
+    /// Calls the instance for the precision: both are compiled here, not in every calling crate.
     fn fill<T: SimdReal>(&self, frames: &[&Frame<T>], field: &mut FlowField<T>) -> Result<()> {
         if let Some(field) = same_mut::<_, FlowField<f32>>(field) {
             self.fill_single(&frames.iter().filter_map(|f| same(*f)).collect::<Vec<_>>(), field)

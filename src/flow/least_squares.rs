@@ -1,5 +1,4 @@
-//! Small dense least squares in double precision, without allocation: Householder QR, then a one-sided Jacobi
-//! singular value decomposition of R.
+//! Small dense least squares without allocation: Householder QR, then one-sided Jacobi SVD of R.
 //!
 //! For ill-conditioned pixels of the per-pixel estimators: normal equations square the condition number, this
 //! does not. (G. Golub, C. Van Loan, "Matrix Computations", 4th ed., 5.2 and 8.6; J. Demmel, K. Veselic 1992

@@ -142,8 +142,7 @@ impl MethodInfo {
 /// The ways to estimate flow from two or three frames.
 #[derive(Debug, Clone)]
 pub enum Method {
-    /// Affine flow from coarse to fine: large motions, edges, untextured areas; the method for everyday
-    /// frames.
+    /// Affine flow from coarse to fine: large motions, edges, untextured areas.
     CoarseToFine(CoarseToFineOptions),
     /// Per pixel, (34): flow and Jacobian from a 3x3x3 block of brightness.
     Instantaneous(InstantaneousOptions),

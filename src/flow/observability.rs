@@ -20,8 +20,7 @@ pub enum Condition {
     /// (i): the Hessian of I is regular and the flow is not zero, or M is not a multiple of the identity, or
     /// M and the gradient are not zero.
     RegularHessian = 1,
-    /// (ii): the gradient and its time derivative are linearly independent (28), even where the Hessian
-    /// vanishes.
+    /// (ii): the gradient and its time derivative are independent (28), even where the Hessian vanishes.
     TurningGradient = 2,
     /// Both.
     Both = 3,
@@ -77,8 +76,7 @@ fn judge(rates: &JetRates<f64>, floor: f64) -> Observability {
     Observability { condition, rank_single: single.rank as u8, rank: both.rank as u8, condition_number: both.condition }
 }
 
-/// Whether a 2x2 matrix has rank 2 beyond rounding noise: its smaller singular value against noise and its
-/// own size.
+/// Whether a 2x2 matrix has rank 2: its smaller singular value against noise and its own size.
 fn regular(a: [[f64; 2]; 2], floor: f64) -> bool {
     let det = (a[0][0] * a[1][1] - a[0][1] * a[1][0]).abs();
     let square: f64 = a.iter().flatten().map(|v| v * v).sum();
@@ -86,8 +84,7 @@ fn regular(a: [[f64; 2]; 2], floor: f64) -> bool {
     largest > 0.0 && det / largest > (2.0 * floor).max(RANK_TOLERANCE * largest)
 }
 
-/// Theorem 1 for a jet `(I, Ix, Iy, Ixx, Ixy, Iyy)` moving by `m = (u, v, u_x, v_x, u_y, v_y)`: `i' = J(i)
-/// m`.
+/// Theorem 1 for a jet `i` moving by `m = (u, v, u_x, v_x, u_y, v_y)`: `i' = J(i) m`.
 pub fn classify(jet: [f64; 6], motion: [f64; 6]) -> Observability {
     let j = Affine::brightness_jacobian(&jet);
     let first = j.map(|row| row.iter().zip(&motion).map(|(a, m)| a * m).sum());

@@ -55,8 +55,7 @@ pub struct EstimatorOptions {
     pub systematic: bool,
     /// Whether to report residual, rank and condition number of each site. Default: no.
     pub diagnostics: bool,
-    /// Standard deviation of the pixel noise, grey levels, for the covariance. `None` (default): from the
-    /// frames.
+    /// Standard deviation of the pixel noise, grey levels. `None` (default): from the frames.
     pub noise: Option<f64>,
     /// Threads. Default: `JACOFLOW_THREADS`, else every processor.
     pub threads: Threads,
@@ -82,8 +81,7 @@ impl Default for EstimatorOptions {
 }
 
 impl EstimatorOptions {
-    /// Checks that lengths, times and noise levels are positive and finite, and the environment if it
-    /// decides.
+    /// Checks lengths, times and noise levels, and the environment if it decides.
     pub(super) fn check(&self) -> Result<()> {
         let positive = |v: f64| v.is_finite() && v > 0.0;
         let (dx, dy) = self.pixel_pitch;

@@ -30,8 +30,7 @@ pub(super) struct FieldBand<'a, T> {
     pub window: Option<&'a mut [T]>,
 }
 
-/// Cuts a field into bands of whole rows ([`BAND_ROWS`] each; points: [`BAND_POINTS`]), independent of the
-/// number of threads.
+/// Cuts a field into bands of [`BAND_ROWS`] rows ([`BAND_POINTS`] points) for any number of threads.
 pub(super) fn bands<T>(field: &mut FlowField<T>) -> Vec<FieldBand<'_, T>> {
     let n = field.width * field.height;
     if n == 0 {

@@ -1,5 +1,4 @@
-//! Symmetric 6x6 matrices as lists of their upper triangle, one matrix a lane: Cholesky factor, solution,
-//! inverse.
+//! Symmetric 6x6 matrices as lists of their upper triangle, one a lane: Cholesky, solution, inverse.
 
 use crate::simd::Lanes;
 
@@ -24,8 +23,7 @@ pub(crate) struct Factor<V> {
     pub largest: V,
 }
 
-/// Factors the normal matrix. Where it is singular the quality says so and the rest is meaningless (but
-/// harmless).
+/// Factors the normal matrix. Where it is singular the quality says so; the rest is harmless.
 #[inline(always)]
 pub(crate) fn factor<V: Lanes>(n: &[V; ENTRIES]) -> Factor<V> {
     let one = V::constant(1.0);

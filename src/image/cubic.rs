@@ -1,5 +1,4 @@
-//! Brightness between the pixels by cubic convolution, at one place or at many; beyond the border its pixels
-//! go on.
+//! Brightness between the pixels by cubic convolution; beyond the border its pixels go on.
 
 use super::Interpolation;
 use crate::math::Real;
@@ -23,8 +22,7 @@ pub(crate) fn cubic_at<T: Real>(frame: &Frame<T>, x: f64, y: f64) -> T {
     T::from_f64(sum)
 }
 
-/// As [`cubic_at`] for every place `(x[i] - origin[0], y[i] - origin[1])`, to `out[i]`; in the precision of
-/// the frame.
+/// As [`cubic_at`] for every place `(x[i] - origin[0], y[i] - origin[1])`, to `out[i]`.
 ///
 /// Panics when `x` or `y` are shorter than `out`, or when the frame is empty.
 pub(crate) fn cubic_at_all<T: SimdReal>(

@@ -1,5 +1,4 @@
-//! Slopes of brightness: convolution with the derivatives of a Gaussian, vectorised along rows and parallel
-//! over row bands.
+//! Slopes of brightness: convolution with the derivatives of a Gaussian, by row bands.
 
 use super::Border;
 use super::blocks::{cover, load, store};

@@ -6,8 +6,7 @@ use crate::types::{Frame, Sample};
 /// Weights of red, green and blue in luma (ITU-R BT.601).
 const WEIGHTS: [f64; 3] = [0.299, 0.587, 0.114];
 
-/// Luma `Y = 0.299 R + 0.587 G + 0.114 B` (ITU-R BT.601) of interleaved samples, `[row][col][channel]`, in
-/// the samples' own type.
+/// Luma `0.299 R + 0.587 G + 0.114 B` (ITU-R BT.601) of samples `[row][col][channel]`.
 ///
 /// `channels` is 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA); alpha is left out. Integer luma is rounded
 /// to the nearest level. A NaN in any colour channel makes its own pixel NaN and no other.

@@ -1,5 +1,4 @@
-//! Grey images before any motion is looked for: borders, smoothing, quantising, colour to grey, sampling,
-//! corners; and pictures of results.
+//! Images before motion: borders, smoothing, quantising, grey, sampling, corners; and pictures.
 
 mod blocks;
 mod border;

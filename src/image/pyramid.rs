@@ -29,8 +29,7 @@ fn taps() -> Vec<f64> {
 /// P. J. Burt and E. H. Adelson, "The Laplacian pyramid as a compact image code", 1983, with sampled Gaussian
 /// weights.
 ///
-/// Each result is a direct sum, so a NaN damages only the pixels whose kernel reaches it. Identical for any
-/// number of threads.
+/// Each result is a direct sum: a NaN damages only the pixels whose kernel reaches it.
 pub(crate) fn halve<T: SimdReal>(level: Level, frame: &Frame<T>) -> Frame<T> {
     let mut out = Frame::default();
     halve_into(level, frame, &mut out);
@@ -124,8 +123,7 @@ fn sum_down<V: Lanes, const N: usize>(rows: &[&[V::Scalar]; 2 * RADIUS + 1], x: 
     sums
 }
 
-/// Seven neighbours summed along, for the results from `x` on: result 0 lies at `even[2]`, which `odd[2]`
-/// follows.
+/// Seven neighbours summed along, from `x` on: result 0 lies at `even[2]`, which `odd[2]` follows.
 #[inline(always)]
 fn sum_along<V: Lanes, const N: usize>(even: &[V::Scalar], odd: &[V::Scalar], x: usize, weights: &[V]) -> [V; N] {
     let pairs = [(odd, 1, 2), (even, 1, 3), (odd, 0, 3)];

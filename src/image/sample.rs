@@ -16,11 +16,9 @@ pub enum Interpolation {
 }
 
 impl Interpolation {
-    /// Brightness of `frame` at `(x, y)` px; NaN where the pixels it needs reach outside the frame or hold
-    /// NaN.
+    /// Brightness of `frame` at `(x, y)` px; NaN where a pixel it needs is outside the frame or NaN.
     ///
-    /// Pixels that would get weight zero are not needed: at integer coordinates the pixel itself is returned,
-    /// whatever is around it.
+    /// At integer coordinates the pixel itself is returned: neighbours of weight zero are not needed.
     pub fn at<T: Real>(self, frame: &Frame<T>, x: f64, y: f64) -> T {
         let (Some((x0, fx)), Some((y0, fy))) = (split(x, frame.width()), split(y, frame.height())) else {
             return T::nan();

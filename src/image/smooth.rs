@@ -152,8 +152,7 @@ pub(crate) fn convolve_separable<T: SimdReal>(
     });
 }
 
-/// One band of output rows: each row is summed down its columns into a scratch row, extended at both ends,
-/// then summed along.
+/// One band of rows: each is summed down into a scratch row, extended at both ends, then summed along.
 struct BandConvolution<'a, T> {
     kernel: &'a SeparableKernel<T>,
     input: &'a [T],

@@ -1,5 +1,4 @@
-//! Brightness between the pixels as a cubic spline: exact at the pixels, twice continuously differentiable,
-//! and fast to read.
+//! Brightness between the pixels as a cubic spline: exact at the pixels, twice differentiable.
 
 mod prefilter;
 
@@ -97,8 +96,7 @@ impl<T: SimdReal> Spline<T> {
     pub(crate) fn sample_in<V: Lanes<Scalar = T>>(&self, x: V, y: V) -> V {
         let (x, y) = (clamp(x, self.width), clamp(y, self.height));
         let (column, row) = (x.floor(), y.floor());
-        // The first tap of pixel (0, 0) is the coefficient at (0, 0): the margin makes up for its lying one
-        // further up and left.
+        // The first tap of pixel (0, 0) lies one further up and left, which the margin makes up for.
         let down = weights(y - row);
         let sums = V::sum_patches(&self.coefficients, self.stride, column, row, down);
         let across = weights(x - column);
@@ -107,8 +105,7 @@ impl<T: SimdReal> Spline<T> {
     }
 }
 
-/// Values a row: room for the margin, a whole number of cache lines, but not of pages, whose columns would
-/// fight for the same lines of a cache.
+/// Values a row: the margin, in whole cache lines but not whole pages, whose columns would conflict.
 fn stride<T>(width: usize) -> usize {
     let (line, page) = (64 / size_of::<T>(), 4096 / size_of::<T>());
     let stride = (width + MARGIN).next_multiple_of(line);
@@ -121,8 +118,7 @@ fn clamp<V: Lanes>(position: V, len: usize) -> V {
     position.max(V::zero()).min(V::constant(len as f64 - 1.0))
 }
 
-/// The cubic B-spline at `f + 1`, `f`, `1 - f` and `2 - f`: the weights of the pixels at -1, 0, 1 and 2 for a
-/// position `f` past pixel 0.
+/// The cubic B-spline at `f + 1`, `f`, `1 - f`, `2 - f`: weights at -1, 0, 1, 2 for a position `f`.
 #[inline(always)]
 fn weights<V: Lanes>(f: V) -> [V; 4] {
     let (sixth, half, two_thirds) = (V::constant(1.0 / 6.0), V::constant(0.5), V::constant(2.0 / 3.0));

@@ -1,5 +1,4 @@
-//! From decoded channels to frames: what becomes of colour where grey is wanted, and of grey where colour is
-//! wanted.
+//! From decoded channels to frames: colour where grey is wanted, and grey where colour is wanted.
 
 use crate::error::{Error, Result};
 use crate::image::luminance;
@@ -22,8 +21,7 @@ pub enum Colour {
 /// What to do with grey pictures where colour frames are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Grey {
-    /// Refuse them: a method that needs colour has none to use. The default. Grey stored as RGB is taken as
-    /// it is.
+    /// Refuse them: a method that needs colour has none. The default. Grey stored as RGB is taken.
     #[default]
     Error,
     /// Take the grey level for red, green and blue alike.
@@ -101,8 +99,7 @@ pub struct Channels<'a, S> {
 }
 
 impl<S: Sample> Channels<'_, S> {
-    /// Whether any pixel's red, green and blue differ. Grey stored as RGB (the only way in BMP) is grey: its
-    /// luma is the level itself.
+    /// Whether any pixel's red, green and blue differ: grey stored as RGB (as in BMP) is grey.
     fn holds_colour(&self) -> bool {
         self.count > 2
             && self.samples.chunks_exact(self.count).any(|p| {

@@ -17,8 +17,7 @@ pub(crate) const EXTENSIONS: &[&str] = &["png", "tif", "tiff", "bmp", "pgm", "pn
 pub(crate) const MAX_SIDE: usize = 65_536;
 /// Most memory one decoded picture may take, bytes.
 const MAX_BYTES: u64 = 2 << 30;
-/// Bytes of picture that one byte of file can stand for in the densest of the codings (long runs in LZW),
-/// with room to spare.
+/// Bytes of picture that one byte of file can stand for at most (long runs in LZW).
 const MAX_EXPANSION: u64 = 4096;
 /// Memory that any file may ask for: decoders keep buffers of their own.
 const FREE_BYTES: u64 = 16 << 20;

@@ -204,8 +204,7 @@ fn optional_arrays<T>(field: &FlowField<T>) -> Vec<String> {
     present.into_iter().filter(|(_, present)| *present).map(|(name, _)| name.to_string()).collect()
 }
 
-/// The planes called `names`, interleaved site by site. Where the estimate is missing so are the parameters
-/// that the model assumes zero.
+/// The planes called `names`, interleaved by site; NaN without an estimate, zero by the model.
 pub(super) fn interleaved<T: Real>(field: &FlowField<T>, names: &[&str]) -> Vec<T> {
     let planes: Vec<Option<&[T]>> = names.iter().map(|name| field.plane(name)).collect();
     let mut out = Vec::with_capacity(names.len() * field.len());

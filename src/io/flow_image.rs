@@ -51,8 +51,7 @@ impl FlowImage {
         Self::new(field.width, field.height, plane(0, dx), plane(1, dy))
     }
 
-    /// As a field of the translational model: every pixel a site, status `Unobservable` where the flow is
-    /// unknown.
+    /// As a translational field: every pixel a site, status `Unobservable` where the flow is unknown.
     ///
     /// # Errors
     /// None for a well-formed image; passes on what [`FlowField::empty`] reports.

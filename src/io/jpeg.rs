@@ -1,7 +1,6 @@
 //! Whether a JPEG file is all there: decoders fill what is missing with grey and say nothing.
 
-/// Whether the picture's compressed data are followed by the end marker. Thumbnails inside the header do not
-/// count.
+/// Whether the compressed data are followed by the end marker; thumbnails do not count.
 pub(crate) fn is_whole(bytes: &[u8]) -> bool {
     scan_start(bytes).is_some_and(|start| bytes[start..].windows(2).any(|pair| pair == [0xff, 0xd9]))
 }

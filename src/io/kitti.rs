@@ -1,7 +1,6 @@
 //! The flow PNG of the KITTI benchmark (A. Geiger et al., "Vision meets robotics: the KITTI dataset", 2013).
 //!
-//! 16-bit RGB: `u = (R - 32768) / 64`, `v = (G - 32768) / 64`, valid where `B > 0`. Flow from -512 to 511.98
-//! px in steps of 1/64.
+//! 16-bit RGB: `u = (R - 32768) / 64`, `v = (G - 32768) / 64`, valid where `B > 0`; px.
 
 use super::FlowImage;
 use super::decode::{check_size, png_error};

@@ -1,5 +1,4 @@
-//! Frames in, results out: sources of grey and of colour frames, and readers and writers of flow, disparity,
-//! arrays, tables, tracks and pictures.
+//! Frames in, results out: sources, and files of flow, disparity, arrays, tables, tracks, pictures.
 //!
 //! Every file is written under a temporary name and renamed when it is whole ([`mod@write`]). Every reader
 //! takes damaged and hostile files for what they are: an [`Error::Format`](crate::Error::Format) with the

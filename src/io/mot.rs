@@ -12,15 +12,13 @@ use crate::error::{Error, Result};
 use crate::types::{TargetBox, TrackState, TrackStatus};
 use std::path::Path;
 
-/// From a side of our boxes, where pixel 0 reaches from -1/2 to 1/2, to the number of the first pixel counted
-/// from 1.
+/// From a side of our boxes, where pixel 0 begins at -1/2, to the first pixel counted from 1.
 const FIRST_PIXEL: f64 = 1.5;
 
 /// Longest text that is read, bytes: hours of boxes.
 const LONGEST: u64 = 256 << 20;
 
-/// Writes boxes in the form of the MOT challenge, in thousandths of a pixel, to a file that appears when it
-/// is finished or to standard output.
+/// Writes boxes in the form of the MOT challenge, in thousandths of a pixel.
 #[derive(Debug)]
 pub struct MotTable {
     table: TableWriter,
@@ -71,8 +69,7 @@ pub struct MotBox {
     pub target: i64,
     /// The box, px.
     pub bounds: TargetBox,
-    /// The seventh number: confidence of results, in ground truth 0 for boxes that are not to be judged; 1
-    /// where the line has none.
+    /// The seventh number, 1 without one: confidence; 0 in ground truth for boxes not to be judged.
     pub confidence: f64,
 }
 

@@ -127,8 +127,7 @@ impl NpyHeader {
         out.write_all(text.as_bytes())
     }
 
-    /// Reads a header (versions 1, 2 and 3) and leaves `input` at the first data byte; also returns the
-    /// header's length in bytes.
+    /// Reads a header (versions 1 to 3) up to the first data byte; also returns its length in bytes.
     ///
     /// # Errors
     /// Those of `input`; kind `InvalidData`, with the reason in words, for anything that is not such a

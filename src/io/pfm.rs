@@ -48,8 +48,7 @@ pub fn write_pfm(path: impl AsRef<Path>, map: &FloatMap) -> Result<()> {
     atomic_io(path.as_ref(), |file| file.write_all(&bytes))
 }
 
-/// Reads a `.pfm` file of either byte order. The scale's size is ignored, as its meaning is left to the
-/// writer.
+/// Reads a `.pfm` file of either byte order; the scale's size is ignored.
 ///
 /// # Errors
 /// [`Error::Io`] when it cannot be read, [`Error::Format`] when it is no such file or cut off.

@@ -94,8 +94,7 @@ impl TableWriter {
         self.end(None)
     }
 
-    /// As [`TableWriter::finish`], under another name in the same folder: for the rows that an interrupted
-    /// run has got so far.
+    /// As [`TableWriter::finish`], under another name in the same folder: for an interrupted run.
     pub fn finish_as(self, path: impl AsRef<Path>) -> Result<()> {
         self.end(Some(path.as_ref()))
     }
@@ -122,8 +121,7 @@ fn system_error(error: csv::Error) -> std::io::Error {
     }
 }
 
-/// A number as a table cell: the shortest digits that read back as the same value; `nan`, `inf` and `-inf` in
-/// words that numpy and pandas read.
+/// A number as a table cell: the shortest digits that read back; `nan`, `inf` and `-inf` as numpy.
 pub fn cell<T: Real>(value: T) -> String {
     let wide = value.to_f64();
     if wide.is_nan() { "nan".into() } else { value.to_string() }

@@ -37,13 +37,11 @@ const NUMBERS: [&str; 28] = [
     "gain",
 ];
 
-/// The entries of one axis's covariance that a symmetric matrix is known by, with their names: p position, v
-/// velocity, a acceleration.
+/// The entries of one axis's covariance with their names: p position, v velocity, a acceleration.
 const ENTRIES: [(&str, usize, usize); 6] =
     [("pp", 0, 0), ("pv", 0, 1), ("pa", 0, 2), ("vv", 1, 1), ("va", 1, 2), ("aa", 2, 2)];
 
-/// Writes tracks as CSV, to a file that appears when it is finished or to standard output. Numbers read back
-/// exactly; what is not known is `nan`.
+/// Writes tracks as CSV. Numbers read back exactly; what is not known is `nan`.
 ///
 /// | columns | unit |
 /// |---|---|
@@ -85,8 +83,7 @@ impl TrackTable {
         Ok(Self { table: TableWriter::create(path, &columns)? })
     }
 
-    /// Adds the row of target number `target` (from 1) at frame `frame` of the input, and its time, s, if
-    /// that is known.
+    /// Adds the row of target `target` (from 1) at a frame of the input, and its time, s, if known.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io) when it cannot be written.

@@ -8,11 +8,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::{NamedTempFile, TempDir};
 
-/// A file under a temporary name in its target's folder; [`AtomicFile::commit`] renames it, dropping it
-/// without that removes it.
+/// A file under a temporary name in its target's folder until [`AtomicFile::commit`] renames it.
 ///
-/// A target that exists and is no regular file (a device, a named pipe) is written directly; a symbolic link
-/// keeps pointing where it points.
+/// Devices and named pipes are written directly; a symbolic link keeps pointing where it points.
 #[derive(Debug)]
 pub struct AtomicFile {
     target: PathBuf,
@@ -59,16 +57,14 @@ impl Drop for TemporaryFolder {
     }
 }
 
-/// Names of the temporary files and folders that this process has now; those of the process it was forked
-/// from are not its to remove.
+/// Names of this process's temporary files and folders, not those of the process it was forked from.
 static TEMPORARIES: PerProcess<Mutex<Vec<PathBuf>>> = PerProcess::new();
 
 fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
     TEMPORARIES.get().lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes every temporary file and folder of this process, for whoever ends it without unwinding (a second
-/// Ctrl-C).
+/// Removes every temporary file and folder of this process (a second Ctrl-C does not unwind).
 ///
 /// While the returned guard lives no other thread can begin or name a file: keep it to the end.
 #[must_use = "files made after the guard is dropped are not removed"]

@@ -10,8 +10,7 @@ use crate::types::{AffineFlow, Frame};
 
 /// Particles are drawn out to this many of their diameters; what is left out is below 1e-11 of the peak.
 const REACH: f64 = 1.8;
-/// Cells looked through for one picture at most. A flow that gathers the plane from further away shows its
-/// background alone.
+/// Cells looked through for one picture at most.
 const MAX_CELLS: f64 = 2e7;
 
 /// How the particles look.
@@ -54,8 +53,7 @@ impl ParticleLook {
     }
 }
 
-/// Gaussian spots `A exp(-8 r^2 / d^2)` strewn at random over the plane (Poisson), each carried along its
-/// exact path without changing its shape.
+/// Gaussian spots `A exp(-8 r^2 / d^2)` strewn at random (Poisson), each carried along its path.
 ///
 /// As in a real recording the spots do not stretch with the flow, so brightness constancy holds for the
 /// centres of particles, not for every pixel.
@@ -94,8 +92,7 @@ impl<M: Motion> ParticleImages<M> {
         Self { name, ..self }
     }
 
-    /// The particles that reach into the rectangle from `(x0, y0)` to `(x1, y1)` at time `t`, in an order
-    /// that does not depend on the rectangle.
+    /// The particles that reach into a rectangle at time `t`, in an order that does not depend on it.
     fn spots(&self, (x0, y0): (f64, f64), (x1, y1): (f64, f64), t: f64) -> Vec<Spot> {
         let margin = REACH * self.look.diameter;
         let (x0, y0, x1, y1) = (x0 - margin, y0 - margin, x1 + margin, y1 + margin);

@@ -26,8 +26,7 @@ pub struct RotatingRamp {
 }
 
 impl RotatingRamp {
-    /// The patent's settings, beta = 0.2, w = pi/100 (400 frames are two turns), I0 = 128, seen from scene
-    /// point (0, 0) on.
+    /// The patent's settings, beta = 0.2, w = pi/100 (400 frames are two turns), I0 = 128.
     pub fn reference(width: usize, height: usize) -> Self {
         Self { width, height, origin: (0.0, 0.0), slope: 0.2, angular_velocity: PI / 100.0, offset: 128.0 }
     }

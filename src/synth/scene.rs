@@ -22,8 +22,7 @@ pub trait Scene: Send + Sync {
     /// Brightness at a point and time, grey levels of an 8-bit scale (not quantised, not clipped).
     fn brightness(&self, x: f64, y: f64, t: f64) -> f64;
 
-    /// Velocity and its Jacobian at a point and time, px/frame and 1/frame; `None` where there is no single
-    /// truth (an edge between motions).
+    /// Velocity and its Jacobian at a point and time, px/frame and 1/frame; `None` at motion edges.
     fn motion(&self, x: f64, y: f64, t: f64) -> Option<AffineFlow<f64>>;
 
     /// How far the matter at `(x, y)` at time `t` has gone `duration` frames later, px. It differs from
@@ -33,8 +32,7 @@ pub trait Scene: Send + Sync {
         None
     }
 
-    /// The frame of time `t`; rows are spread over the threads of the current pool, the samples do not depend
-    /// on how many.
+    /// The frame of time `t`; rows are spread over the threads of the current pool.
     fn frame(&self, t: f64) -> Frame<f64> {
         let origin = self.origin();
         render(self.size(), |column, row| self.brightness(origin.0 + column as f64, origin.1 + row as f64, t))

@@ -46,8 +46,7 @@ impl Sensor {
         Err(Error::argument("noise", "a finite number of grey levels, 0 or more", self.noise))
     }
 
-    /// The frame as the camera delivers it. Noise depends on the seed, the frame's `index` and the pixel, on
-    /// nothing else.
+    /// The frame as the camera delivers it. Noise depends on the seed, the frame's `index` and the pixel.
     pub fn apply(&self, frame: &Frame<f64>, index: u64) -> Frame<f64> {
         let rng = CounterRng::new(self.random_state).stream(index);
         let mut pixel = 0u64;
@@ -63,8 +62,7 @@ impl Sensor {
         })
     }
 
-    /// As [`Sensor::apply`], as 8-bit samples; what the rounding left over is cut off, and values outside 0
-    /// ..= 255 are clipped.
+    /// As [`Sensor::apply`], as 8-bit samples, cut off and clipped to 0 ..= 255.
     pub fn apply_u8(&self, frame: &Frame<f64>, index: u64) -> Frame<u8> {
         self.apply(frame, index).map(|&value| value as u8)
     }

@@ -5,12 +5,10 @@ use crate::error::{Error, Result};
 use crate::parallel::for_each_band;
 use crate::types::{AffineFlow, FieldLayout, FlowField, MOTION_NAMES, SamplingGrid, Status};
 
-/// Half the step of the central differences of displacements, px: errors of the paths' third derivatives and
-/// of rounding are both near 1e-9.
+/// Half the step of the central differences of displacements, px: errors are near 1e-9.
 const STEP: f64 = 1e-3;
 
-/// The truth of a whole frame as a flow field: velocity and Jacobian at time `t`; [`Status::Masked`] and NaN
-/// where the scene has none.
+/// The truth of a frame as a field: velocity and Jacobian at time `t`; [`Status::Masked`] without.
 ///
 /// # Errors
 /// None for a well-formed scene; passes on what [`FlowField::empty`] reports.
@@ -52,8 +50,7 @@ pub fn mean_truth(scene: &dyn Scene, t: f64, (from, to): (f64, f64)) -> Result<F
     })
 }
 
-/// The field whose motion at scene point `(x, y)` is `motion(x, y)`; rows are spread over the threads of the
-/// current pool.
+/// The field whose motion at scene point `(x, y)` is `motion(x, y)`.
 fn field(scene: &dyn Scene, t: f64, motion: impl Fn(f64, f64) -> Option<[f64; 6]> + Sync) -> Result<FlowField<f64>> {
     let layout = FieldLayout {
         frame_size: scene.size(),

@@ -159,8 +159,7 @@ impl AnyFlowFilter {
         self.resume(filter, None)
     }
 
-    /// The state as bytes, with the sample type of its frames (empty: unknown); `None` before the first
-    /// frame.
+    /// The state as bytes, and the sample type of its frames (or empty); `None` before the first frame.
     pub fn to_bytes(&self) -> Result<Option<(Vec<u8>, &'static str)>> {
         each!(&self.filter, filter => Ok(Some((filter.to_bytes()?, self.dtype.unwrap_or_default()))), Ok(None))
     }
@@ -184,8 +183,7 @@ impl AnyFlowFilter {
         }
     }
 
-    /// Continues a saved filter if it has these options. The full scale depends on the frames and is compared
-    /// with the next one.
+    /// Continues a saved filter if it has these options; the full scale is compared with the next frame.
     fn resume(&mut self, filter: Filter, dtype: Option<&'static str>) -> Result<()> {
         let same = |saved: &FlowFilterOptions| {
             let mut mine = self.options.clone();

@@ -1,5 +1,4 @@
-//! The affine-flow dynamical system of one pixel (WO2010/098160, (11)), its step over one frame, and the
-//! Jacobians of both.
+//! The dynamical system of one pixel (WO2010/098160, (11)), its step over a frame, and Jacobians.
 //!
 //! State `q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y)`; the motion stands still, the brightness
 //! follows it: `i' = J(i) m = A(m) i`.
@@ -49,8 +48,7 @@ pub fn rate_jacobian(q: &State) -> Matrix {
     f
 }
 
-/// One frame of `q' = f(q) + w` by one classical Runge-Kutta step, the drift `w` held constant inside it,
-/// (54).
+/// One frame of `q' = f(q) + w` by one classical Runge-Kutta step, the drift `w` constant, (54).
 pub fn rk4(q: &State, w: &State) -> State {
     let add = |a: &State, s: f64, b: &State| -> State { std::array::from_fn(|k| a[k] + s * b[k]) };
     let slope = |q: &State| add(&rate(q), 1.0, w);

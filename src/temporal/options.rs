@@ -59,8 +59,7 @@ pub enum Transition {
     /// One step of the classical Runge-Kutta method; the patent's.
     #[default]
     Rk4,
-    /// The closed form: an affine velocity field maps quadratics to quadratics. Process noise is added at the
-    /// end of the frame.
+    /// The closed form: affine velocity maps quadratics to quadratics. Noise is added at the frame's end.
     Exact,
 }
 
@@ -87,8 +86,7 @@ impl Transition {
     }
 }
 
-/// In which order the Cholesky factor that spreads the sigma points takes the state: which of the many square
-/// roots `L`, `L L^T = P`, it is.
+/// In which order the Cholesky factor that spreads the sigma points takes the state.
 ///
 /// To second order the points have the same moments with any root, beyond that not. On the patent's ramp
 /// (frames 200 to 399, by `tests/temporal/filter_forms.rs`) the rms errors of `u` differ by less than 0.3 %
@@ -132,12 +130,10 @@ impl SquareRoot {
 
 /// Options of [`FlowFilter`](super::FlowFilter). The default is [`FlowFilterOptions::patent`].
 ///
-/// States are ordered `q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y)`, in 8-bit grey levels, px
-/// and frames.
+/// States are `q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y)`, 8-bit grey levels, px, frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlowFilterOptions {
-    /// Pixels that a measurement takes in; 3x3. Weights, where it has any, make the measurement's noise the
-    /// weighted fit's.
+    /// Pixels that a measurement takes in, by default 3x3; weights are those of the fit.
     pub neighbourhood: Neighbourhood,
     /// How the prediction is carried out.
     pub form: FilterForm,
@@ -156,8 +152,7 @@ pub struct FlowFilterOptions {
     pub initial_covariance: [f64; 12],
     /// Constants of the sigma points.
     pub sigma_points: SigmaPoints,
-    /// The sample value that stands for 255 grey levels: 255 for `u8` and for floats in grey levels, 65535
-    /// for `u16`, 1 for floats in [0, 1].
+    /// The sample value that stands for 255 grey levels: 65535 for `u16`, 1 for floats in [0, 1].
     pub full_scale: f64,
     /// Where the filters are; every pixel by default.
     pub sites: SamplingGrid,
@@ -165,8 +160,7 @@ pub struct FlowFilterOptions {
     pub mask: Option<Mask>,
     /// Deliver the 6x6 covariance of the motion with each field (21 planes).
     pub covariance: bool,
-    /// Deliver the root mean square residual of the quadratic fit, grey levels: an estimate of the pixel
-    /// noise, for free.
+    /// Deliver the rms residual of the quadratic fit, grey levels: an estimate of the pixel noise.
     pub residual: bool,
     /// Physical size `(dx, dy)` of a pixel: fields come in these units. States stay in px.
     pub pixel_pitch: (f64, f64),

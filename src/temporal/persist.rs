@@ -154,8 +154,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         Ok(self.write_to(writer)?.into_inner()?.into_inner())
     }
 
-    /// The filter that [`to_bytes`](Self::to_bytes) put down: on the same instruction set it goes on bit for
-    /// bit.
+    /// The inverse of [`to_bytes`](Self::to_bytes), to the bit on the same instruction set.
     ///
     /// # Errors
     /// [`Error::Format`] for bytes that are no filter state, of another version or of another precision than

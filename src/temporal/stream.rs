@@ -56,8 +56,7 @@ impl<T: SimdReal> FlowStream<T> {
         Ok(Self { plan, fusion, frames: VecDeque::new(), pushed: 0 })
     }
 
-    /// Takes the next frame; returns a field once there are enough frames. Its `frame_index` counts pushed
-    /// frames from 0.
+    /// Takes the next frame; returns a field once there are enough. Its `frame_index` counts frames from 0.
     ///
     /// # Errors
     /// [`Error::Argument`] naming `frames` for a frame of another size, and those of the estimator; the frame

@@ -112,8 +112,7 @@ impl<T: Real> FlowField<T> {
         }
         if m[0].finite() { AffineFlow::from_array(m) } else { AffineFlow::from_array([T::nan(); 6]) }
     }
-    /// Standard deviation of the parameter called `name` at every site: the root of its variance. `None`
-    /// without covariance or such a parameter.
+    /// Standard deviation of the parameter `name` at every site; `None` without covariance or parameter.
     pub fn standard_deviation(&self, name: &str) -> Option<Vec<T>> {
         let (planes, n, p) = (self.covariance.as_ref()?, self.len(), self.layout.parameters.len());
         let k = self.layout.parameters.iter().position(|q| q == name)?;
@@ -133,15 +132,13 @@ impl<T: Real> FlowField<T> {
         }
         planes
     }
-    /// Covariance matrices of `(u, v, u_x, v_x, u_y, v_y)`, 36 values a site, as [`FlowField::covariance_at`]
-    /// gives them.
+    /// Covariance matrices, 36 values a site, as [`FlowField::covariance_at`] gives them.
     pub fn covariance_matrices(&self) -> Option<Vec<T>> {
         self.covariance.as_ref()?;
         let matrices = (0..self.len()).filter_map(|site| self.covariance_at(site));
         Some(matrices.flatten().flatten().map(T::from_f64).collect())
     }
-    /// Covariance of `(u, v, u_x, v_x, u_y, v_y)` at site `index`, px/frame and 1/frame; rows of parameters
-    /// that the model lacks are zero.
+    /// Covariance of `(u, v, u_x, v_x, u_y, v_y)` at site `index`; parameters not in the model: zero.
     pub fn covariance_at(&self, index: usize) -> Option<[[f64; 6]; 6]> {
         let planes = self.covariance.as_ref()?;
         let (n, p) = (self.len(), self.layout.parameters.len());

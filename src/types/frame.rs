@@ -104,8 +104,7 @@ pub trait Sample: Copy + Send + Sync + 'static {
     const FULL_SCALE: f64;
     /// The sample in working precision, unscaled.
     fn to_real<T: Real>(self) -> T;
-    /// The nearest sample to `value`: integers are rounded and kept in range (NaN becomes 0), floats are
-    /// rounded to their precision.
+    /// The nearest sample to `value`; integers are kept in range, and NaN becomes 0.
     fn from_f64_nearest(value: f64) -> Self;
 }
 

@@ -19,8 +19,7 @@ pub enum Status {
     MinNorm = 5,
     /// A filter lost its positive-definite covariance and was restarted here.
     Repaired = 6,
-    /// No estimate at this time: the prediction from earlier ones, with a covariance that grows until the
-    /// next one.
+    /// No estimate at this time: the prediction from earlier ones, with a growing covariance.
     Predicted = 7,
     /// A full estimate that the frames contradict: brightness changes along it by far more than usual. The
     /// pixel is occluded in another frame, has changed, or moves differently; the covariance does not include

@@ -74,8 +74,7 @@ impl TrackStatus {
     }
 }
 
-/// The target at one frame. Lengths in px, times in frames, x right, y down; values that a method does not
-/// provide are NaN or `None`.
+/// The target at one frame, in px and frames, x right, y down; what a method lacks is NaN or `None`.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct TrackState {
@@ -83,8 +82,7 @@ pub struct TrackState {
     pub frame: usize,
     /// Status of the target.
     pub status: TrackStatus,
-    /// Reason for the status, in a few words; may be empty. Not part of a serialised state: these are words
-    /// of the program.
+    /// Reason for the status, in a few words; may be empty. Not part of a serialised state.
     #[cfg_attr(feature = "serde", serde(skip))]
     pub reason: &'static str,
     /// Whether this is the first measurement after the target was lost or out of the picture.

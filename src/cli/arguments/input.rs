@@ -43,8 +43,7 @@ impl SelectionArguments {
         }
     }
 
-    /// Which frames of the input these are: `given` frames per second of the input, or those that the source
-    /// states for the frames that it delivers.
+    /// Which frames of the input these are; `given` or else `delivered` by the source: frames per second.
     pub fn numbering(&self, given: Option<f64>, delivered: Option<f64>) -> Numbering {
         let rate = given.or_else(|| delivered.map(|rate| rate * self.step as f64));
         Numbering { start: self.start, step: self.step, rate }

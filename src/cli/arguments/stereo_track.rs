@@ -95,8 +95,7 @@ impl StereoTrackerArguments {
     pub fn times(&self, numbering: Numbering) -> Result<Option<PairTimes>> {
         let Some(path) = &self.times else { return Ok(None) };
         let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
-        // A time that is missing must not move the later ones to other pairs, so that only the end may be
-        // blank.
+        // Only the end may be blank: a missing time must not move the later ones to other pairs.
         let lines = text.trim_end().lines().enumerate().filter(|(_, line)| !line.starts_with('#'));
         let read = |(number, line): (usize, &str)| {
             let first = line.split(|c: char| c.is_whitespace() || c == ',').find(|word| !word.is_empty());

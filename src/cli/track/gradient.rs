@@ -82,8 +82,7 @@ fn trackers(frame: &Frame<f64>, starts: &[Start], options: &GradientOptions) -> 
     starts.iter().enumerate().map(begin).collect()
 }
 
-/// An error of a tracker under the names that this command has for its arguments, with the target that it is
-/// about.
+/// An error of a tracker with this command's names of the arguments and the target that it is about.
 fn in_our_words(error: Error, target: usize) -> Error {
     let named =
         |ours, expected, got| Error::Argument { argument: ours, expected, got: format!("{got} (target {target})") };

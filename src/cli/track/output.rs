@@ -107,8 +107,7 @@ impl TrackOutputArguments {
         Ok(vec![(TableTarget::File(path.to_path_buf()), by_name)])
     }
 
-    /// The place that a summary names: the requested one, or the other name that the file of a run which was
-    /// stopped has.
+    /// The place that a summary names: the requested one, or the partial file of a stopped run.
     pub fn place<'a>(&'a self, latest: Option<&'a PathBuf>) -> Option<&'a PathBuf> {
         match (latest, &self.output) {
             (Some(file), Some(asked)) if !is_folder(asked) && file.extension() == asked.extension() => Some(file),

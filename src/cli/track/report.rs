@@ -10,8 +10,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 impl TrackCommand {
-    /// The report of a run whose first sink is the overlay, if there is one; `details` are further entries of
-    /// the summary.
+    /// The report of a run whose first sink is the overlay, if any; `details` extend the summary.
     pub(super) fn report(&self, summary: &TrackSummary, failure: Option<Error>, details: Value) -> Report {
         let interrupted = matches!(failure, Some(Error::Interrupted));
         let output = self.output.place(summary.latest.as_ref());

@@ -28,8 +28,7 @@ impl ParticleFilter {
         Ok(means)
     }
 
-    /// Weighted covariances `sum w (x - mean)(x - mean)^T` `(B, n, n)`, without a correction for the finite
-    /// number of particles.
+    /// Weighted covariances `sum w (x - mean)(x - mean)^T` `(B, n, n)`, not corrected for finite `N`.
     pub fn covariance(&self) -> Result<Vec<f64>> {
         let (n, means) = (self.dim_x, self.mean()?);
         let mut covariances = vec![0.0; self.batch * n * n];
@@ -62,8 +61,7 @@ impl ParticleFilter {
 
     /// Marginal quantiles of every component at the `levels` in [0, 1]: `(levels, B, n)`.
     ///
-    /// The quantile at level q is the smallest value of a particle with a weight above zero at which the
-    /// cumulative weight is at least q.
+    /// The smallest value, of positive weight, at which the cumulative weight is at least q.
     ///
     /// # Errors
     /// [`Error::Argument`] naming `q` for a level outside [0, 1].

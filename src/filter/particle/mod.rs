@@ -1,5 +1,4 @@
-//! Particle filters: the posterior as weighted samples, for any transition and any likelihood, over a batch
-//! of independent states.
+//! Particle filters: the posterior as weighted samples, for any transition and any likelihood.
 //!
 //! A cycle is [`predict`](ParticleFilter::predict) (each particle moves at random),
 //! [`update`](ParticleFilter::update) (its weight is multiplied by the likelihood) and

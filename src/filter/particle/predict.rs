@@ -10,8 +10,7 @@ impl ParticleFilter {
     /// Moves all particles by `transition(x, next)`, arrays `(B, N, n)`, and adds Gaussian noise of
     /// covariance `noise` `(n, n)` or `(B, n, n)`.
     ///
-    /// Without `noise` the transition must be random itself; [`Self::standard_normal`] has the numbers for
-    /// it.
+    /// Without `noise` the transition must be random itself, by [`Self::standard_normal`].
     ///
     /// # Errors
     /// The transition's own, [`Error::Argument`] naming `transition` for results that are not finite, or `Q`

@@ -14,8 +14,7 @@ pub enum Resampling {
     Multinomial,
     /// One position in each of `count` equal intervals, each with its own uniform number.
     Stratified,
-    /// Positions `(i + u) / count` with one uniform number for all: copies differ from `count w` by less than
-    /// 1.
+    /// Positions `(i + u) / count` with one uniform number: copies differ from `count w` by less than 1.
     #[default]
     Systematic,
     /// `floor(count w)` copies of each, the rest by independent draws from the remainders (J. S. Liu and R.

@@ -6,8 +6,7 @@ use super::weights::{effective_sample_size, linear_weights};
 use crate::error::{Error, Result};
 
 impl ParticleFilter {
-    /// Selects `count` particles of each set by their weights (none: as many as before), which are equal
-    /// afterwards.
+    /// Selects `count` particles of each set by weight (none: as many as before); then all weights are equal.
     ///
     /// With a `threshold` only sets whose effective sample size is below `threshold` N are resampled, unless
     /// `count` differs from N. Returns which sets were, `(B)`.

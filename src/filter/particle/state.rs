@@ -21,8 +21,7 @@ pub struct ParticleFilter {
     pub x: Vec<f64>,
     /// Logarithms of the normalised weights `(B, N)`; `-ln N` at first.
     pub log_weights: Vec<f64>,
-    /// Log evidence `log sum_i w_i L_i` of the last update, `(B)`; 0 at first, `-inf` where the update was
-    /// refused.
+    /// Log evidence `log sum_i w_i L_i` of the last update, `(B)`; 0 at first, `-inf` where refused.
     pub log_evidence: Vec<f64>,
     /// Sum of the log evidence over the accepted updates, `(B)`.
     pub log_evidence_sum: Vec<f64>,
@@ -143,8 +142,7 @@ impl ParticleFilter {
         CounterRng::new(self.random_state).stream(self.targets[set]).stream(step).stream(purpose)
     }
 
-    /// Calls `work(set, row of (B, N), standard normals, output)` for every particle; normals and output have
-    /// n values.
+    /// Calls `work(set, row of (B, N), standard normals (n), output (n))` for every particle.
     pub(super) fn for_each_particle(
         &self,
         purpose: Purpose,

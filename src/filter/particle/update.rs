@@ -5,8 +5,7 @@ use super::weights::normalise_log_weights;
 use crate::error::{Error, Result};
 
 impl ParticleFilter {
-    /// Adds `log_likelihood(x, out)`, arrays `(B, N, n)` and `(B, N)`, to the log weights and normalises
-    /// them.
+    /// Adds `log_likelihood(x, out)`, arrays `(B, N, n)` and `(B, N)`, to the log weights, normalised.
     ///
     /// NaN counts as `-inf`, a likelihood of zero. A set in which no particle is left with a weight above
     /// zero refuses the update: its weights and its sum of log evidence stay, `log_evidence` is `-inf` and

@@ -1,7 +1,6 @@
 //! Weights of particles: normalisation in logarithms and the effective sample size.
 
-/// Normalises log weights so that their exponentials sum to 1, by log-sum-exp; returns the logarithm of the
-/// sum before.
+/// Normalises log weights by log-sum-exp; returns the logarithm of the sum before.
 ///
 /// NaN counts as `-inf`, a weight of zero. With `w_i L_i` given, `w` normalised, the result is the log
 /// evidence `log sum_i w_i L_i`. `None`, and nothing is changed, if no weight is above zero or if one is

@@ -6,8 +6,7 @@ use crate::types::{Frame, Mask};
 /// Standard deviation that brightness is scaled to, grey levels: about that of 8-bit pictures.
 const TARGET_STD: f64 = 40.0;
 
-/// Minimum standard deviation of a residual, as a share of that of the brightness: smaller ones are rounding
-/// and interpolation.
+/// Minimum standard deviation of a residual, as a share of that of the brightness (rounding).
 pub(super) const MIN_RESIDUAL_SHARE: f64 = 4e-3;
 /// Approximate maximum number of samples used.
 const MAX_SAMPLES: usize = 20_000;
@@ -21,8 +20,7 @@ const TRIMMED_FRACTION_DIVISOR: usize = 200;
 /// Minimum standard deviation over the mean; less is rounding.
 const MIN_STD_OVER_MEAN: f64 = 1e-12;
 
-/// Extent of the sorted `values` without the outermost ones. Repeated extreme values mark missing data and do
-/// not count.
+/// Extent of the sorted `values` without the outermost and repeated extreme ones (missing data).
 fn trimmed_extent(values: &[f64]) -> f64 {
     let (low, high) = (values[0], values[values.len() - 1]);
     let start = if values.get(1) == Some(&low) { values.partition_point(|v| *v <= low) } else { 0 };

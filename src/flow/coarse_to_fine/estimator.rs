@@ -65,8 +65,7 @@ impl CoarseToFine {
     }
 }
 
-/// The covariance, if requested. It needs so many planes that for large frames all other memory is returned
-/// to the system before and after.
+/// The covariance, if requested. It needs so many planes that other memory is returned first.
 fn covariance_of<T: SimdReal>(
     estimate: &mut Estimate<T>,
     workspace: &mut Workspace<T>,

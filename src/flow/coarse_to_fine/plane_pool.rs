@@ -14,8 +14,7 @@ pub(super) struct PlanePool<T> {
 }
 
 impl<T: SimdReal> PlanePool<T> {
-    /// Planes with any finite content: the smallest free ones that are large enough, or the largest,
-    /// enlarged.
+    /// Planes with any finite content: the smallest free ones large enough, or the largest, enlarged.
     pub fn planes(&self, width: usize, height: usize, count: usize) -> Planes<T> {
         let len = Planes::<T>::len(width, height, count);
         let mut free = lock(&self.free);
@@ -34,8 +33,7 @@ impl<T: SimdReal> PlanePool<T> {
         }
     }
 
-    /// Returns planes, but frees those of large frames: they are most of an estimate's memory, and later
-    /// stages need it.
+    /// Returns planes, but frees those of large frames: later stages need the memory.
     pub fn keep_small(&self, planes: Planes<T>) {
         if planes.room() * size_of::<T>() <= MAX_KEPT_BYTES / 4 {
             self.keep(planes);

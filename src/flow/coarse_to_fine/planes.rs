@@ -30,8 +30,7 @@ impl<T: SimdReal> Planes<T> {
         planes
     }
 
-    /// Changes the size, in the same memory if large enough. The content is any finite value: callers write
-    /// all sites.
+    /// Changes the size, in the same memory if large enough; the content is any finite value.
     pub fn reshape(&mut self, width: usize, height: usize, count: usize) {
         (self.width, self.height, self.count) = (width, height, count);
         let len = self.row_len() * height;

@@ -11,14 +11,11 @@ use rayon::prelude::*;
 /// Samples of a parallel task.
 const CHUNK: usize = 1 << 16;
 
-/// Distance, px, over which an unusable sample affects the jets of warped frames: half the taps of the spline
-/// and of the stencils.
+/// Distance, px, over which an unusable sample affects jets: half the taps of spline and stencils.
 const HOLE_REACH: usize = 3;
-/// Minimum usable pixels of the 49 within [`HOLE_REACH`]: a straight edge at that distance, or scattered dead
-/// pixels, are allowed.
+/// Minimum usable pixels of the 49 within [`HOLE_REACH`]: allows a straight edge or dead pixels.
 const MIN_USABLE_OF_49: usize = 40;
-/// Minimum usable pixels of nine. Levels that only hand motion down have no other condition, since small
-/// areas between holes would be lost there.
+/// Minimum usable pixels of nine, on levels that only hand motion down: keeps small areas.
 const MIN_USABLE_OF_9: usize = 6;
 
 /// Which frames are compared.

@@ -17,11 +17,9 @@ pub(super) struct Schedule {
     pub tolerance: [f64; 2],
     /// Smoothness terms and sweeps after each linearisation.
     pub smoothness: Smoothness,
-    /// Relaxation sweeps on the finest level: they cost a fraction of a linearisation and remove most of the
-    /// error that is left after one.
+    /// Relaxation sweeps on the finest level: cheap, they remove most of what one linearisation leaves.
     pub finest_sweeps: usize,
-    /// Number of levels above the finest from which on the unregularised trial is run, so that small objects
-    /// are found; `None`: never.
+    /// Levels above the finest from which the unregularised trial is run (small objects); `None`: never.
     pub trial_from: Option<usize>,
     /// Whether the motion one level above the finest is refined before it is carried down: it then has less
     /// noise, and slopes from wider windows. Not at half resolution, where that level has too few sites to
@@ -93,8 +91,7 @@ impl Schedule {
         }
     }
 
-    /// The schedule of level `k` (0: the frame itself) of `size` pixels; on the coarsest nothing is known
-    /// yet.
+    /// The schedule of level `k` (0: the frame) of `size` pixels; on the coarsest nothing is known.
     pub fn on_level(&self, k: usize, size: (usize, usize), is_coarsest: bool) -> LevelSchedule {
         let runs_trial = self.trial_from.is_some_and(|above| k >= self.finest_level + above);
         let refines = self.refines_intermediate && k == self.finest_level + 1;

@@ -37,8 +37,7 @@ impl<T: SimdReal> Workspace<T> {
         self.space.clear();
     }
 
-    /// Returns unused planes of a large workspace to the system: later blocks have other sizes and would not
-    /// fit.
+    /// Returns unused planes of a large workspace to the system: later blocks have other sizes.
     pub fn release_to_system_if_large(&self) {
         if self.is_large() {
             self.clear();
@@ -46,8 +45,7 @@ impl<T: SimdReal> Workspace<T> {
         }
     }
 
-    /// Returns everything but the `needed` planes to the system. The next estimate allocates anew, which
-    /// takes time.
+    /// Returns everything but the `needed` planes to the system; the next estimate allocates anew.
     pub fn release_to_system<'a>(&mut self, needed: impl Iterator<Item = &'a mut Planes<T>>) {
         *self = Self::default();
         needed.for_each(Planes::shrink);

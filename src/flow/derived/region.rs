@@ -37,8 +37,7 @@ fn position<T: Real>(field: &FlowField<T>, index: usize) -> (f64, f64) {
     (x as f64 * dx, y as f64 * dy)
 }
 
-/// Values of a quantity at every site, row-major; NaN where the field has no estimate or its model no
-/// Jacobian.
+/// Values of a quantity at every site, row-major; NaN without estimate or Jacobian.
 ///
 /// # Errors
 /// [`Error::Argument`] naming `quantity` for one that needs the frame period of a field without.

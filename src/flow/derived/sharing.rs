@@ -59,8 +59,7 @@ pub(super) fn in_common(scatter: f64, (count, values): (usize, usize), sharing: 
     (1.0 - chance - scatter / left).max(0.0)
 }
 
-/// Sums over the neighbourhood of some of the sites in which correlations count; `length` in steps of the
-/// lattice.
+/// Sums over the neighbourhoods of some of the sites; `length` in steps of the lattice.
 fn on_lattice(width: usize, used: &[usize], length: f64) -> f64 {
     let rows = used.iter().max().map_or(0, |last| last / width + 1);
     let mut present = vec![false; rows * width];

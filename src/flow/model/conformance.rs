@@ -98,8 +98,7 @@ pub fn recovery<M: MotionModel<N, P>, const N: usize, const P: usize>() {
     }
 }
 
-/// Doubling the jets doubles the equations; summing them sums the equations: what the propagation of noise
-/// relies on.
+/// Doubling or summing jets doubles or sums the equations: the propagation of noise relies on it.
 pub fn linearity<M: MotionModel<N, P>, const N: usize, const P: usize>() {
     let of = |s: u64| JetRates { jet: jet(s), first: jet(s + 10), second: jet(s + 20) };
     let (p, q) = (of(1), of(2));

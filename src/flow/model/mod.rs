@@ -71,20 +71,17 @@ impl Parameter {
     }
 }
 
-/// A motion model with P unknowns, determined at a pixel by N linear equations in the jet and its time
-/// derivatives.
+/// A motion model with P unknowns and N equations linear in the jet and its time derivatives.
 pub trait MotionModel<const N: usize, const P: usize> {
     /// Name on the command line and in Python.
     const NAME: &'static str;
     /// The unknowns, `u` and `v` first.
     const PARAMETERS: [Parameter; P];
 
-    /// The equations `A m = b`. Each is linear in `(i, i', i'')`, coefficients and right side alike, so that
-    /// noise can be propagated.
+    /// The equations `A m = b`, both sides linear in `(i, i', i'')`, so that noise can be propagated.
     fn equations(rates: &JetRates<f64>) -> ([[f64; P]; N], [f64; N]);
 
-    /// The flow that the unknowns describe, at offset `(dx, dy)` px from the pixel and `t` frames from the
-    /// estimate.
+    /// The flow at offset `(dx, dy)` px from the pixel and `t` frames from the estimate.
     fn velocity(m: &[f64; P], dx: f64, dy: f64, t: f64) -> (f64, f64);
 }
 

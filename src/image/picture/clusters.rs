@@ -3,8 +3,7 @@
 use super::digits::draw_number;
 use super::{Arrow, Picture, Quiver, Rgb};
 
-/// Hues of numbers that follow each other are this share of the wheel apart (the golden section): none of
-/// many is near another.
+/// Hues of successive numbers are this share of the wheel apart (the golden section).
 const APART: f64 = 0.618_033_988_749_895;
 
 /// The colour that a number always has, neither dark nor pale.

@@ -1,5 +1,4 @@
-//! What comes near, over a frame: points in the colours of their rates of approach, and the focus of
-//! expansion.
+//! What comes near, over a frame: points coloured by rate of approach, and the focus of expansion.
 
 use super::diverging::{SignedMap, symmetric_range};
 use super::{Picture, Rgb};
@@ -58,8 +57,7 @@ fn draw_focus(picture: &mut Picture, at: [f64; 2], covariance: &[[f64; 2]; 2]) {
         picture.blend(cx + d, cy, FOCUS, 1.0);
         picture.blend(cx, cy + d, FOCUS, 1.0);
     }
-    // The lower factor of the covariance turns a circle into the ellipse; 5.99 is chi-squared's 95 % for two
-    // numbers.
+    // The lower factor turns a circle into the ellipse; 5.99 is chi-squared's 95 % for two numbers.
     let first = covariance[0][0].sqrt();
     let second = covariance[0][1] / first;
     let third = (covariance[1][1] - second * second).max(0.0).sqrt();

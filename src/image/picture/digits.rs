@@ -16,8 +16,7 @@ const DOTS: [[u8; 5]; 10] = [
     [7, 5, 7, 1, 7],
 ];
 
-/// Writes `number` so that it ends 2 dots above `(left, bottom)`, in dots of `size x size` px; nothing for a
-/// place that is not finite.
+/// Writes `number`, ending 2 dots above `(left, bottom)`, in dots of `size x size` px.
 pub(super) fn draw_number(picture: &mut Picture, number: usize, left: f64, bottom: f64, size: usize, colour: Rgb) {
     if !(left.is_finite() && bottom.is_finite()) {
         return;

@@ -17,8 +17,7 @@ pub fn symmetric_range<T: Real>(plane: &[T], at_percentile: f64) -> f64 {
 /// A diverging map with a range symmetric about zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SignedMap {
-    /// Value of the strongest red (and, negative, of the strongest blue); `None` (the default):
-    /// [`symmetric_range`].
+    /// Value of the strongest red and, negated, blue; `None` (the default): [`symmetric_range`].
     pub range: Option<f64>,
     /// Percentile of the automatic range; default 98.
     pub percentile: f64,

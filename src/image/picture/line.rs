@@ -2,8 +2,7 @@
 
 use super::{Picture, Rgb};
 
-/// Draws a straight stroke `thickness` px wide with round ends; each pixel is covered by how far its centre
-/// lies inside the stroke.
+/// Draws a straight stroke `thickness` px wide with round ends, covering pixels partly at its edge.
 pub(super) fn draw_stroke(picture: &mut Picture, from: (f64, f64), to: (f64, f64), thickness: f64, colour: Rgb) {
     if ![from.0, from.1, to.0, to.1].iter().all(|c| c.is_finite()) {
         return;

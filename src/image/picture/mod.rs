@@ -1,8 +1,7 @@
 //! Pictures of results: flow as colours or arrows, divergence and curl as a diverging map, frames as grey,
 //! tracks, clusters and disparities over them, graphs over time.
 //!
-//! Everything here works on plain row-major planes and gives a [`Picture`], eight bits a channel; `io` writes
-//! it as PNG.
+//! Everything here turns row-major planes into a [`Picture`], eight bits a channel.
 
 mod chart;
 mod clusters;

@@ -139,8 +139,7 @@ impl TrackOverlay {
     }
 }
 
-/// Corners of the box about its centre, turned where the rotation can be told; none for a box that is not
-/// known.
+/// Corners of the box about its centre, turned where the rotation is observable; none if unknown.
 fn box_corners(state: &TrackState) -> Vec<[f64; 2]> {
     let (bounds, [x, y]) = (state.bounds, state.bounds.centre());
     let angle = if state.rotation_observable && state.rotation.is_finite() { state.rotation } else { 0.0 };

@@ -16,12 +16,10 @@ const STEPS: [(usize, Rgb); 6] = [
     (6, [255, 0, 255]),
 ];
 
-/// The colour wheel of the Middlebury flow pages: no motion is white, full speed is the pure hue, right is
-/// red, down is yellow.
+/// The colour wheel of the Middlebury flow pages: rest is white, right is red, down is yellow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FlowColours {
-    /// Speed of full saturation, px/frame; `None` (the default): the given percentile of the speeds. Faster
-    /// is darker.
+    /// Speed of full saturation, px/frame; `None`: the given percentile of the speeds. Faster is darker.
     pub max_speed: Option<f64>,
     /// Percentile of the automatic range; default 99.
     pub percentile: f64,
@@ -41,8 +39,7 @@ impl FlowColours {
         Self { max_speed, ..Self::default() }
     }
 
-    /// The speed of full saturation for this flow: `max_speed`, else the percentile; 1 where all of it is at
-    /// rest.
+    /// The speed of full saturation for this flow: `max_speed`, else the percentile; 1 at rest.
     pub fn range<T: Real>(&self, u: &[T], v: &[T]) -> f64 {
         let speeds = u.iter().zip(v).map(|(u, v)| u.to_f64().hypot(v.to_f64()));
         let range = self.max_speed.unwrap_or_else(|| percentile(speeds, self.percentile));
@@ -83,8 +80,7 @@ fn colour(wheel: &[[f64; 3]], u: f64, v: f64) -> Option<Rgb> {
     if !speed.is_finite() {
         return None;
     }
-    // A turn of the flow runs once through the hues; red stands for motion to the right, where the angle
-    // below jumps by a turn.
+    // A turn of the flow runs once through the hues; at red, to the right, the angle jumps by a turn.
     let turn = (-v).atan2(-u) / std::f64::consts::TAU + 0.5;
     let place = turn * (wheel.len() - 1) as f64;
     let first = (place as usize).min(wheel.len() - 1);

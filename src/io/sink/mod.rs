@@ -13,8 +13,7 @@ use super::channels::FrameFormat;
 use crate::error::{Error, Result};
 use crate::types::{AnyColourFrame, AnyFrame};
 
-/// Takes frames, one at a time, all of one size and sample type: grey ones ([`AnyFrame`]), or
-/// [`AnyColourFrame`].
+/// Takes frames of one size and sample type, one at a time: [`AnyFrame`] or [`AnyColourFrame`].
 pub trait FrameSink<F = AnyFrame>: Send {
     /// Adds a frame.
     ///
@@ -33,8 +32,7 @@ pub trait FrameSink<F = AnyFrame>: Send {
 /// A sink of colour frames.
 pub type ColourSink = dyn FrameSink<AnyColourFrame>;
 
-/// A kind of sink: which specifications it takes and how it is opened, with the frame rate (frames per
-/// second).
+/// A kind of sink: which specifications it takes and how it is opened, with frames per second.
 struct Kind {
     accepts: fn(&str) -> bool,
     open: fn(&str, f64) -> Result<Box<dyn FrameSink>>,

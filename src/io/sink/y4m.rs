@@ -15,8 +15,7 @@ pub(super) const KIND: Kind = Kind {
     open_colour: |spec, frame_rate| Ok(Box::new(Y4mSink::open(spec, frame_rate)?)),
 };
 
-/// Writes uint8 frames as `Cmono`, uint16 frames as `Cmono16`; colour as `C444` and `C444p16`, full range, by
-/// the matrix of ITU-R BT.601.
+/// Writes frames as `Cmono`, `Cmono16`, in colour `C444`, `C444p16`, full range, by ITU-R BT.601.
 #[derive(Debug)]
 pub struct Y4mSink {
     output: Output,

@@ -15,8 +15,7 @@ pub(super) const KIND: Kind = Kind {
     open_colour: |spec, policy| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, policy)?)),
 };
 
-/// Ways to say "every coded frame once, none repeated or dropped": of `ffmpeg` 5.1 and later, and of earlier
-/// ones.
+/// "Every coded frame once": for `ffmpeg` 5.1 and later, and for earlier ones.
 const EVERY_FRAME: [[&str; 2]; 2] = [["-fps_mode", "passthrough"], ["-vsync", "0"]];
 
 /// Conversion to what [`Y4mSource`] takes colour for, from any matrix and depth of the file. Limited range,

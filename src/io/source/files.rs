@@ -31,8 +31,7 @@ fn open_files<P: ChannelPolicy>(spec: &str, policy: P) -> Result<Box<dyn FrameSo
     Ok(Box::new(FilesSource::new(vec![path.to_path_buf()], policy)?))
 }
 
-/// The image files of a folder in natural order (`frame9` before `frame10`); hidden files and other
-/// extensions are left out.
+/// The image files of a folder, not hidden, in natural order (`frame9` before `frame10`).
 fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Error::io(folder, e))?;
     let mut paths = Vec::new();
@@ -50,8 +49,7 @@ fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Natural order of the names; equal ones (`1`, `01`) by their bytes, so that the order never depends on the
-/// file system.
+/// Natural order of the names; equal ones (`1`, `01`) by their bytes.
 pub(super) fn sort_naturally(paths: &mut [PathBuf]) {
     paths.sort_by(|a, b| natord::compare(&a.to_string_lossy(), &b.to_string_lossy()).then_with(|| a.cmp(b)));
 }
@@ -82,8 +80,7 @@ impl Uniform {
     }
 }
 
-/// One frame a file, in the order given: grey with the policy [`Colour`], colour with
-/// [`Grey`](crate::io::Grey).
+/// One frame a file, in the order given, by the policies [`Colour`] and [`Grey`](crate::io::Grey).
 #[derive(Debug)]
 pub struct FilesSource<P = Colour> {
     paths: Vec<PathBuf>,
@@ -93,8 +90,7 @@ pub struct FilesSource<P = Colour> {
 }
 
 impl<P: ChannelPolicy> FilesSource<P> {
-    /// A source of these image files. They are opened when their frame is read; each must have the size
-    /// and sample type of the first.
+    /// A source of these image files, each opened when its frame is read.
     ///
     /// # Errors
     /// [`Error::Argument`] named `frames` for an empty list.

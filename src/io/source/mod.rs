@@ -45,8 +45,7 @@ impl Default for OpenOptions {
     }
 }
 
-/// A sequence of frames, one at a time, all of one size and sample type: grey ones ([`AnyFrame`]), or
-/// [`AnyColourFrame`].
+/// Frames of one size and sample type, one at a time: [`AnyFrame`] or [`AnyColourFrame`].
 pub trait FrameSource<F = AnyFrame>: Send {
     /// The next frame; `None` after the last.
     ///
@@ -54,8 +53,7 @@ pub trait FrameSource<F = AnyFrame>: Send {
     /// [`Error::Io`] or [`Error::Format`] with the path of the file that cannot be read.
     fn next_frame(&mut self) -> Result<Option<F>>;
 
-    /// Passes over up to `count` frames, without decoding them where the format allows it; returns how many
-    /// there were.
+    /// Passes over up to `count` frames, if possible without decoding; returns how many there were.
     fn skip(&mut self, count: usize) -> Result<usize> {
         for done in 0..count {
             if self.next_frame()?.is_none() {

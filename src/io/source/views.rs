@@ -11,11 +11,9 @@ pub enum ViewLayout {
     SideBySide,
     /// The left view in the upper half.
     TopBottom,
-    /// Side by side in a frame of the ordinary size: each view squeezed to half its width, to which it is
-    /// widened again.
+    /// Side by side in a frame of the ordinary size: each view is widened to twice its columns.
     HalfSideBySide,
-    /// One above the other in a frame of the ordinary size: each view squeezed to half its height, to which
-    /// it is stretched again.
+    /// One above the other in a frame of the ordinary size: each view is stretched to twice its rows.
     HalfTopBottom,
 }
 

@@ -1,5 +1,4 @@
-//! YUV4MPEG2 (`.y4m`): uncompressed video with a text header, from a file or standard input. The luma plane
-//! is the grey image.
+//! YUV4MPEG2 (`.y4m`): uncompressed video, from a file or standard input; luma is the grey image.
 
 use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
@@ -27,8 +26,7 @@ fn open_stream<P: ChannelPolicy>(spec: &str, policy: P) -> Result<Box<dyn FrameS
 /// Longest header line accepted, bytes.
 const MAX_LINE: u64 = 4096;
 
-/// Frames of a YUV4MPEG2 stream: `mono`, `420` (all variants), `411`, `422`, `440` and `444` with or without
-/// alpha, 8 to 16 bit.
+/// Frames of a YUV4MPEG2 stream: `mono`, `420`, `411`, `422`, `440`, `444`, 8 to 16 bit.
 ///
 /// Eight-bit streams give uint8, deeper ones (`p10`, `p12`, ..., `mono16`) uint16. What is read depends on
 /// [`Y4mSource::with_policy`]:
@@ -195,8 +193,7 @@ impl<R: BufRead, P: ChannelPolicy> Y4mSource<R, P> {
         Error::format(&self.name, format!("frame {} {what}", self.frame))
     }
 
-    /// Reads `count` bytes, into memory that grows as they come: a header alone cannot make a large
-    /// allocation.
+    /// Reads `count` bytes, into memory that grows as they come: a header alone allocates little.
     fn read_bytes(&mut self, count: usize) -> Result<Vec<u8>> {
         let mut bytes = Vec::new();
         (&mut self.input).take(count as u64).read_to_end(&mut bytes).map_err(|e| Error::io(&self.name, e))?;

@@ -2,8 +2,7 @@
 
 use super::PointMap;
 
-/// The map along the paths of the steady field `velocity` for `duration` frames, backwards where it is
-/// negative: Runge-Kutta of fourth order.
+/// The map along the paths of the steady field `velocity` for `duration` frames: Runge-Kutta.
 pub(super) fn integrate<'a>(
     velocity: impl Fn(f64, f64) -> (f64, f64) + Send + Sync + 'a,
     duration: f64,

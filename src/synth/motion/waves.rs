@@ -7,8 +7,7 @@ use std::f64::consts::TAU;
 
 /// Number of waves.
 const WAVES: usize = 8;
-/// Radians of the waves that the matter may pass in one step of the path integration, at root-mean-square
-/// speed.
+/// Radians of the waves that matter passes in one step of the path integration, at rms speed.
 const RADIANS_PER_STEP: f64 = 0.03;
 /// Fewest steps of the path integration in one frame.
 const FEWEST_STEPS: f64 = 4.0;
@@ -45,8 +44,7 @@ impl Waves {
         let waves = std::array::from_fn(|i| {
             let draw = 4 * i as u64;
             let wave_number = TAU / wavelength * 2f64.powf(0.5 * rng.uniform(draw) - 0.25);
-            // Half a turn of directions, a whole turn between a wave and what it moves: along the wave is
-            // divergence, across it is curl.
+            // Half a turn of directions, a whole turn between a wave and what it moves (divergence to curl).
             let direction = 0.5 * share(i, draw + 1);
             let polarisation = direction + share(i * 3 % WAVES, draw + 2);
             Wave {

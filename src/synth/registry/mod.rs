@@ -206,8 +206,7 @@ impl<'a> Settings<'a> {
         if value > 0.0 { Ok(value) } else { Err(Error::argument(name, "a positive number", value)) }
     }
 
-    /// The point `(x, y)` of these names; the middle of the frame, `origin + (size - 1) / 2`, where it is not
-    /// given.
+    /// The point `(x, y)` of these names; by default the middle of the frame, `origin + (size - 1) / 2`.
     fn point(&self, x: &str, y: &str) -> (f64, f64) {
         let or_middle = |value: f64, origin: f64, size: usize| {
             if value.is_nan() { origin + (size as f64 - 1.0) / 2.0 } else { value }

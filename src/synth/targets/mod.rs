@@ -1,5 +1,4 @@
-//! Colour scenes with targets that look alike, cross and hide each other before a moving camera, with exact
-//! boxes.
+//! Colour scenes of targets that look alike and hide each other before a moving camera.
 //!
 //! People and cars drawn from signed distances move over a textured world, which a camera that pans, shakes,
 //! rolls and zooms looks at. All targets of a scene share one texture, and rectangles of the world have their

@@ -6,25 +6,21 @@ use crate::error::{Error, Result};
 /// Largest number of frames: the paths of camera and targets are kept in memory.
 const MAX_FRAMES: usize = 1_000_000;
 
-/// Smallest and largest scale: below, a limb is thinner than a pixel; above, a frame has more than 6000
-/// columns.
+/// Smallest and largest scale: a limb is as wide as a pixel, a frame has 6000 columns.
 const SCALES: (f64, f64) = (0.1, 8.0);
 
 /// Options of a scene of targets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TargetSceneOptions {
-    /// Seed of the world, the texture, the gait, the shake and the noise: another recording of the same
-    /// scene.
+    /// Seed of world, texture, gait, shake and noise: another recording of the same scene.
     pub random_state: u64,
     /// What all lengths are multiplied by; at 1 a frame has 720 x 480 px.
     pub scale: f64,
     /// Standard deviation of the white noise of each channel, grey levels.
     pub noise: f64,
-    /// Number of frames; `None`: as many as the scene usually has. Zoom and sizes reach their last value in
-    /// the last frame.
+    /// Number of frames; `None`: the scene's own. Zoom and sizes reach their last value in the last one.
     pub frames: Option<usize>,
-    /// Colour cast that grows to the last frame: red is multiplied by `1 - r`, blue by `1 + r / 2`, r from 0
-    /// to this; 0 to 1.
+    /// Colour cast in the last frame, 0 to 1: red is multiplied by `1 - r`, blue by `1 + r / 2`.
     pub colour_cast: f64,
 }
 

@@ -19,8 +19,7 @@ impl TargetScene {
         self.frame_with(frame, |_| true)
     }
 
-    /// As [`TargetScene::frame`], with only those targets drawn that `drawn` says; noise and all else are the
-    /// same.
+    /// As [`TargetScene::frame`], with only those targets that `drawn` says; noise is the same.
     pub fn frame_with(&self, frame: usize, drawn: impl Fn(usize) -> bool) -> ColourFrame<u8> {
         let (width, height) = self.size();
         let visible = self.drawing_order().iter().filter(|&&target| drawn(target));

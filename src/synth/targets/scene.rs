@@ -101,8 +101,7 @@ impl TargetScene {
         &self.order
     }
 
-    /// The exact box of a target in a frame: its nominal size about its centre, whether it is seen or not,
-    /// px.
+    /// The exact box of a target in a frame, px: its nominal size about its centre, seen or not.
     pub fn target_box(&self, frame: usize, target: usize) -> TargetBox {
         let Stance { centre, size: [width, height], .. } = self.stance(frame, target);
         TargetBox::about(centre, width, height)

@@ -7,8 +7,7 @@ use crate::types::Frame;
 /// One lattice of the noise: distance of its points, px, and the greatest value it reaches.
 pub(super) type Octave = (f64, f64);
 
-/// A sum of bilinearly interpolated lattices of uniform random numbers, `sum_o a_o U_o(x / c_o)` with `U` in
-/// [-1, 1].
+/// A sum of bilinear lattices of uniform random numbers, `sum_o a_o U_o(x / c_o)`, `U` in [-1, 1].
 pub(super) fn value_noise(rng: CounterRng, (width, height): (usize, usize), octaves: &[Octave]) -> Frame<f64> {
     let lattices: Vec<Lattice> =
         octaves.iter().zip(0..).map(|(&octave, k)| Lattice::new(rng.stream(k), (width, height), octave)).collect();

@@ -47,8 +47,7 @@ impl World {
         Self { picture: picture.map(|pixel| pixel.map(|level| level.clamp(0.0, 255.0))) }
     }
 
-    /// The colour at a point relative to the world's centre, px: bilinear, and beyond its border that of the
-    /// border.
+    /// The colour at a point relative to the world's centre, px: bilinear, replicated at the border.
     pub(super) fn colour(&self, x: f64, y: f64) -> [f64; 3] {
         let (width, height) = self.picture.size();
         let place = |value: f64, length: usize| {

@@ -6,8 +6,7 @@ use crate::math::random::CounterRng;
 
 /// Lattice points along each side after which the noise repeats, px. A power of two.
 const PERIOD: usize = 1024;
-/// Reach of the Gaussian, in its standard deviations: what is left out is below 1e-10 of the standard
-/// deviation.
+/// Reach of the Gaussian, in its standard deviations: the rest is below 1e-10.
 const REACH: f64 = 7.0;
 /// Widest Gaussian, px: twice its reach must stay well below the period.
 const MAX_SIGMA: f64 = 32.0;
@@ -27,8 +26,7 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// Noise of standard deviation `std` grey levels about `mean`, filtered by a Gaussian of standard
-    /// deviation `sigma` px.
+    /// Noise of standard deviation `std` grey levels about `mean`, filtered by a Gaussian of `sigma` px.
     ///
     /// # Errors
     /// [`Error::Argument`] for a `sigma` outside 0.5 to 32 px (a narrower one would show the lattice) or a

@@ -20,8 +20,7 @@ pub struct Speckle {
 }
 
 impl Speckle {
-    /// Blobs of mean `radius` px covering about the share `coverage` of the plane, with an edge `edge` px
-    /// wide.
+    /// Blobs of mean `radius` px on about the share `coverage` of the plane, their edge `edge` px wide.
     ///
     /// # Errors
     /// [`Error::Argument`] for a radius or an edge that is not positive, an edge wider than the radius, a
@@ -39,8 +38,7 @@ impl Speckle {
         if !(levels.0.is_finite() && levels.1.is_finite()) {
             return Err(Error::argument("levels", "finite grey levels", format!("{levels:?}")));
         }
-        // Blobs strewn at random leave exp(-area / cell^2) of the plane free. Mean of the squared radius
-        // factor: 1.03.
+        // Blobs strewn at random leave exp(-area / cell^2) free. Mean of the squared radius factor: 1.03.
         let cell = radius * (1.03 * std::f64::consts::PI / -(1.0 - coverage).ln()).sqrt();
         let rng = CounterRng::new(seed);
         Ok(Self { radius, edge, cell, dark: levels.0, bright: levels.1, rng })

@@ -74,8 +74,7 @@ impl<T: SimdReal> FlowFilter<T> {
         Ok(Self { options, frame_size, frames: 0, repairs: 0, store, constants, decorrelation, fit })
     }
 
-    /// The same filter with other threads and, where one is given, another instruction set: for a filter that
-    /// was saved elsewhere.
+    /// The same filter with other threads and, if given, instruction set: for one saved elsewhere.
     pub fn with_computation(mut self, threads: Threads, simd: Option<Level>) -> Self {
         self.options.threads = threads;
         self.options.simd = simd.or(self.options.simd);
@@ -118,11 +117,9 @@ impl<T: SimdReal> FlowFilter<T> {
         Some(self.store.state(index))
     }
 
-    /// Takes in the next frame: predicts, updates, and returns flow and Jacobian with the `Status` of each
-    /// site.
+    /// Takes in the next frame; returns flow and Jacobian with the `Status` of each site.
     ///
-    /// Where a neighbourhood holds a NaN the filter only predicts; that frame's result is NaN there, with
-    /// status `NonFinite`.
+    /// Where a neighbourhood holds a NaN the filter only predicts; the result is NaN, `NonFinite`.
     ///
     /// # Errors
     /// [`Error::Argument`] for a frame of another size; the filter is then unchanged.

@@ -42,8 +42,7 @@ fn column<V: Lanes, const J: usize>(cov: &[V; PACKED], order: &[usize; N], colum
     }
 }
 
-/// Gives pixel `lane` of a block a covariance that has a factor: by loading its diagonal, or, when nothing of
-/// it is left, by starting anew.
+/// Gives pixel `lane` of a block a covariance that has a factor: a loaded diagonal, or a new start.
 #[cold]
 #[inline(never)]
 pub(super) fn repair<T: SimdReal>(block: &mut [T], lane: usize, constants: &Constants<T>) {

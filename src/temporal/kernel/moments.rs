@@ -1,5 +1,4 @@
-//! Second moments of propagated points: sums of outer products, tile by tile so that the sums stay in
-//! registers.
+//! Second moments of propagated points, tile by tile so that sums stay in registers.
 
 use super::{N, PACKED, packed};
 use crate::simd::Lanes;

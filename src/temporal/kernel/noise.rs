@@ -1,5 +1,4 @@
-//! Process noise that acts inside a Runge-Kutta step: what the noise dimensions of the augmented sigma points
-//! contribute.
+//! Process noise inside a Runge-Kutta step: the noise dimensions of the augmented sigma points.
 //!
 //! Of the 24 pairs of points of the augmented form, 12 move only the noise. Those that drive the brightness
 //! are linear, so a pair contributes exactly `Q_k psi_k psi_k^T` with `psi = 1 + A/2 + A^2/6 + A^3/24`. Those
@@ -15,11 +14,9 @@ use crate::simd::Lanes;
 
 /// Contributions of the noise pairs.
 pub(super) struct NoisePairs<V> {
-    /// Full vectors, to be squared with weight one: three of the Hessian's noise, then odd and even parts of
-    /// the four flow derivatives'.
+    /// Full vectors of weight one: three of the Hessian's noise, odd and even parts of four derivatives'.
     pub full: [[V; 6]; 11],
-    /// Vectors without curvature `(I, Ix, Iy)`, likewise: two of the gradient's noise, then the odd parts of
-    /// u's and v's.
+    /// Vectors without curvature `(I, Ix, Iy)`: two of the gradient's noise, odd parts of u's and v's.
     pub slope: [[V; 3]; 4],
     /// Variance that `I` alone gains.
     pub brightness: V,
@@ -65,16 +62,14 @@ pub(super) fn noise_pairs<V: Lanes>(i: &[V; 6], a: &Generator<V>, constants: &Co
         }
     }
 
-    // The stages of the undisturbed step, which every direction shares: y2, y3, y4 are where slopes 2, 3 and
-    // 4 are taken.
+    // The stages of the undisturbed step: y2, y3, y4 are where slopes 2, 3 and 4 are taken.
     let y2 = plus_times(i, half, &a.apply(i));
     let y3 = plus_times(i, half, &a.apply(&y2));
     let y4 = plus_times(i, V::constant(1.0), &a.apply(&y3));
     for j in 0..6 {
         let sigma = spread * q[6 + j].sqrt();
         let third = sixth + sixth;
-        // Slopes 2, 3, 4: coefficients of sigma (k2, k3, k4) and of its square (s3, s4); the cube of slope 4
-        // joins the odd part.
+        // Slopes 2, 3, 4: coefficients of sigma (k2, k3, k4) and its square (s3, s4).
         let along = direction(&y2, j);
         let k2 = times(&along, half);
         let y3_odd = times(&along, quarter);

@@ -24,8 +24,7 @@ pub(in crate::temporal) const EXTENDED: u8 = FilterForm::Extended as u8;
 /// Most vectors that a form's covariance is summed from: 24 images and 11 of noise.
 const VECTORS: usize = 35;
 
-/// Room for one vector of pixels; made once, since clearing it for every one would cost as much as a tenth of
-/// the work.
+/// Room for one vector of pixels; made once, since clearing it costs a tenth of the work.
 struct Scratch<V> {
     /// The factor. Entries above its diagonal are zero from the beginning and never written.
     columns: Columns<V>,
@@ -187,8 +186,7 @@ fn sigma_points<V: Lanes, S: Step, const FORM: u8, const PAIRS: usize, const POI
     shift
 }
 
-/// The factor of the brightness's covariance given the motion, moved by the mean motion: exact, because that
-/// step is linear.
+/// The factor of the brightness's covariance given the motion, moved by the mean motion: exact.
 #[inline(always)]
 fn conditional<V: Lanes, S: Step>(columns: &Columns<V>, m: &[V; 6], whole: V, out: &mut [[V; 6]]) {
     let map = S::map(m);

@@ -1,5 +1,4 @@
-//! One frame of `i' = A(m) i` for lanes of pixels: Runge-Kutta and the closed form, with their derivatives
-//! along the motion.
+//! One frame of `i' = A(m) i` for lanes: Runge-Kutta and closed form, with derivatives along `m`.
 //!
 //! `A(m)` is block triangular: the Hessian feeds the gradient, the gradient feeds `I`, and `I` feeds nothing.
 
@@ -111,8 +110,7 @@ fn scaled<V: Lanes, const K: usize>(y: &[V; K], factor: f64) -> [V; K] {
     times(y, V::constant(factor))
 }
 
-/// One classical Runge-Kutta step. For constant `m` it is the Taylor polynomial `1 + A + A^2/2 + A^3/6 +
-/// A^4/24`.
+/// One classical Runge-Kutta step: `1 + A + A^2/2 + A^3/6 + A^4/24` for constant `m`.
 pub(in crate::temporal) struct Rk4;
 
 impl Step for Rk4 {
@@ -127,8 +125,7 @@ impl Step for Rk4 {
 
     #[inline(always)]
     fn apply<V: Lanes>(a: &Generator<V>, i: &[V; 6]) -> [V; 6] {
-        // Horner, with the factorials moved into the multiples of i: i + A (24 i + A (12 i + A (4 i + A i)))
-        // / 24.
+        // Horner, the factorials in the multiples of i: i + A (24 i + A (12 i + A (4 i + A i))) / 24.
         let y = a.add_slopes(i, &scaled(i, 4.0));
         let y = a.add_slopes(&y, &scaled(i, 12.0));
         let y = a.add_slopes(&y, &scaled(i, 24.0));

@@ -53,8 +53,7 @@ impl<T: SimdReal> Decorrelation<T> {
 pub(in crate::temporal) struct Update<'a, T> {
     /// States.
     pub blocks: &'a mut [T],
-    /// Measured jets, six rows of `BLOCK` for each block, then a row that is one where there is a measurement
-    /// and zero where not.
+    /// Measured jets, six rows of `BLOCK` for each block, then a row that is one where measured, else zero.
     pub measured: &'a [T],
     /// Set to one for each pixel that was repaired.
     pub repaired: &'a mut [u8],
@@ -231,8 +230,7 @@ impl<V: Lanes> Elimination<V> {
 
 /// Updates mean and covariance of the brightness with six components of variances `r`.
 ///
-/// A component's own row is multiplied by `r / s`, exactly what subtraction would leave, without the
-/// cancellation.
+/// A component's own row is multiplied by `r / s`: subtraction without the cancellation.
 #[inline(always)]
 fn brightness_block<V: Lanes>(lane: &mut Lane<V>, jet: &[V; 6], present: V, r: &[V::Scalar; 6]) -> Elimination<V> {
     let (zero, missing) = (V::zero(), V::constant(1.0) - present);

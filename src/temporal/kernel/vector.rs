@@ -51,8 +51,7 @@ pub(super) fn six<V: Lanes, const K: usize>(all: &[V; K], from: usize) -> [V; 6]
     out
 }
 
-/// Repeats a block for `K = 0, 1, ... 5`, as constants: conditions on the index vanish, and arrays stay in
-/// registers.
+/// Repeats a block for `K = 0, 1, ... 5`, as constants, so that arrays stay in registers.
 macro_rules! for_six {
     ($k:ident => $body:block) => {
         for_six!(@each $k $body 0 1 2 3 4 5)

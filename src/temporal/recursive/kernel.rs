@@ -6,11 +6,9 @@ use crate::simd::{Kernel, Lanes, SimdReal};
 /// Sites of a block.
 pub(super) const BLOCK: usize = 16;
 
-/// Normalised innovation squared beyond which a pixel starts anew: chi-square with six degrees of freedom,
-/// one in ten thousand.
+/// Normalised innovation squared beyond which a pixel starts anew: chi-square(6), one in ten thousand.
 pub const RESTART: f64 = 27.86;
-/// Normalised mean innovation squared beyond which the memory is shortened; six are expected, one in sixteen
-/// is larger.
+/// Normalised mean innovation squared beyond which the memory is shortened: chi-square(6), 1 in 16.
 pub const FADE: f64 = 12.0;
 /// Systematic share of the covariance for methods that do not report it: measured on the coarse-to-fine
 /// estimate of textures with 4 grey levels of noise.

@@ -18,8 +18,7 @@ impl Default for RecursiveOptions {
 }
 
 impl RecursiveOptions {
-    /// The options from a user's words: `temporal` is `none` (the default) or `recursive`, `forgetting` its
-    /// factor.
+    /// The options from words: `temporal` is `none` (the default) or `recursive`, `forgetting` its factor.
     ///
     /// # Errors [`Error::Argument`] naming `temporal` for another word, and `forgetting` without recursion or
     /// out of range.

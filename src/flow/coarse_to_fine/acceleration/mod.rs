@@ -22,8 +22,7 @@ use crate::simd::SimdReal;
 /// Rounds of iterative reweighting.
 const REWEIGHTING_ROUNDS: usize = 4;
 
-/// Share from which on the flow counts as steady; below one minus it, as not steady at all. Estimates smooth
-/// the rest away.
+/// Share from which on the flow counts as steady; below one minus it, as not steady at all.
 const STEADY_SHARE: f64 = 0.9;
 
 /// Moves the `motion` of a triple to the pixels of the middle frame; `regularized` is the motion before
@@ -104,8 +103,7 @@ fn difference<T: SimdReal>(
     out
 }
 
-/// Half the acceleration of the steady share of the `motion`, if the `change` from its mean step to the next
-/// contains any.
+/// Half the acceleration of the steady share of the `motion`, if its `change` contains any.
 fn acceleration<T: SimdReal>(space: &PlanePool<T>, motion: &Planes<T>, change: &Planes<T>) -> Option<Planes<T>> {
     let slow = steady::half_acceleration(space, motion);
     let mut whole = steady::next_step(space, motion, &slow);
@@ -170,8 +168,7 @@ fn nearest(numbers: &[usize], to: usize) -> usize {
     if to.abs_diff(before) < to.abs_diff(after) { before } else { after }
 }
 
-/// Share of the `steady` change in the `change`, 0 to 1: a line through the origin, fitted with Cauchy's
-/// weights.
+/// Share of the `steady` change in the `change`, 0 to 1: a slope, fitted with Cauchy's weights.
 fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
     let (mut share, mut typical) = (0.0, f64::INFINITY);
     for _ in 0..REWEIGHTING_ROUNDS {

@@ -12,8 +12,7 @@ const MAX_ROUNDS: usize = 3;
 /// Root-mean-square change, px, at which rounds end.
 const ROUND_TOLERANCE: f64 = 0.004;
 
-/// Half the acceleration of a slow steady flow, `M (u, v) / 2`, with its derivatives by differences of
-/// neighbouring sites.
+/// Half the acceleration of a slow steady flow, `M (u, v) / 2`, with derivatives by differences.
 pub(super) fn half_acceleration<T: SimdReal>(space: &PlanePool<T>, motion: &Planes<T>) -> Planes<T> {
     let (width, height) = (motion.width, motion.height);
     let mut out = space.planes(width, height, MOTION);

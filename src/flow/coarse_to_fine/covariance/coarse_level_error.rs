@@ -1,5 +1,4 @@
-//! Coarse-level error: finer levels correct errors of coarser ones only where their data constrain the
-//! motion.
+//! Coarse-level error: finer levels correct coarser ones only where data constrain the motion.
 //!
 //! A coarse level reaches further into an area without texture than a fine one, and is less exact. Its errors
 //! are measured at sites with texture, where the refined motion is better known: mean squares of the
@@ -19,8 +18,7 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Distance that a level reaches into an untextured area, px of the level: its stencils and data windows.
 const LEVEL_REACH: f64 = 4.0;
-/// Variance of the slopes over the mean square rise of the flow's standard deviation: errors are not equally
-/// steep everywhere.
+/// Variance of the slopes over the mean square rise of the flow's standard deviation.
 const RISE_SHARE: f64 = 0.35;
 
 /// Coarse-level error of a node.
@@ -111,8 +109,7 @@ impl CoarseLevelErrors {
         below * (pixels / from).powi(2)
     }
 
-    /// Variance without any reference site: the range of motions of the coarsest level, a pixel of it within
-    /// its reach.
+    /// Variance without any reference site: the range of motions of the coarsest level.
     fn unverified(&self, kind: usize) -> f64 {
         if kind == 0 { 4f64.powi(self.variances.len() as i32) } else { LEVEL_REACH.powi(-2) }
     }
@@ -161,8 +158,7 @@ mod tests {
     use super::*;
     use crate::flow::coarse_to_fine::covariance::noise::{ALL, NONE, UnconstrainedDirections};
 
-    /// Constrained sites around a square of unconstrained ones, all usable; and the number of nodes along a
-    /// side.
+    /// Constrained sites around a square of unconstrained ones; and the number of nodes along a side.
     fn but_for(side: usize, square: std::ops::Range<usize>) -> (ConstrainedDirections, usize) {
         let constrained = |n: usize| !(square.contains(&(n % side)) && square.contains(&(n / side)));
         let sites: Vec<UnconstrainedDirections> =

@@ -24,8 +24,7 @@ const FIXED_SIGMA: f64 = 6.0;
 const CHOSEN_SIGMA_FACTOR: f64 = 1.25;
 /// Minimum sigma, px, of a window whose loss is measured separately.
 const MIN_CHOSEN_SIGMA: f64 = 3.5;
-/// Isotropic share of the slopes' squared errors: turbulence without divergence loses none, yet its estimate
-/// has divergence.
+/// Isotropic share of the slopes' squared errors: estimates of turbulence have divergence.
 const ISOTROPIC_SHARE: f64 = 0.2;
 /// Nodes of a parallel task.
 const NODES_PER_TASK: usize = 1024;

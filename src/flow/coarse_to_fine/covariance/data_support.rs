@@ -11,8 +11,7 @@ use crate::simd::SimdReal;
 
 /// Positions of the nodes in the usable area.
 pub(super) struct DataSupport {
-    /// Signed distances, px, along x and along y, to the outermost usable site; negative at a node without
-    /// data.
+    /// Signed distances, px, along x and y, to the outermost usable site; negative at nodes without data.
     distances: Vec<[f64; 2]>,
     along: Axis,
     across: Axis,

@@ -33,8 +33,7 @@ const TRIAL: (usize, Smoothness) =
 /// Minimum distance, px of the level, of the trial's motion from the regularised one; nearer, it is the same
 /// motion with more noise.
 const MIN_MOTION_DIFFERENCE: f64 = 0.5;
-/// Minimum change in the first iteration of the trial, px of the level: without it, no site leaves its
-/// motion.
+/// Minimum change in the first iteration of the trial, px of the level: else no site leaves its motion.
 const MIN_TRIAL_CHANGE: f64 = 0.25;
 /// Regularised iterations after both motions are combined.
 const JOINT_ITERATIONS: usize = 2;

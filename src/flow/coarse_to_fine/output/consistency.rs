@@ -69,8 +69,7 @@ fn row_energies<T: SimdReal>(data: &Planes<T>, y: usize) -> impl Iterator<Item =
     uu.iter().zip(vv).zip(energy).map(|((uu, vv), energy)| [uu.to_f64() + vv.to_f64(), energy.to_f64()])
 }
 
-/// Median energy of the half of the sites with most information: untextured ones have no residual whatever
-/// the motion.
+/// Median energy of the half of the sites with most information: untextured ones have no residual.
 fn typical_energy<T: SimdReal>(data: &Planes<T>) -> f64 {
     let stride = (data.width * data.height / MAX_SAMPLES).max(1);
     let mut known: Vec<_> = (0..data.height).flat_map(|y| row_energies(data, y)).step_by(stride).collect();

@@ -31,8 +31,7 @@ pub(super) fn covariance_of<T: SimdReal>(
     frames: &[&Frame<T>],
     common: &EstimatorOptions,
 ) -> CovarianceMaps<T> {
-    // White noise through the stencils of the rows: half its variance in each row of a pair's difference, an
-    // eighth in a triple's.
+    // White noise in each row: half its variance in a pair's difference, an eighth in a triple's.
     let share = if frames.len() == 2 { 0.5 } else { 0.125 };
     let halving_gain = halved_noise().powi(estimate.level as i32);
     let energy_of = |variance: f64| share * rows() * halving_gain * variance * estimate.brightness.gain.powi(2);
@@ -44,8 +43,7 @@ pub(super) fn covariance_of<T: SimdReal>(
     covariance(estimate, noise, frames.len() == 2, common.systematic)
 }
 
-/// Writes the estimate and its covariance at the field's sites. A pair's motion is carried from midway to the
-/// first frame.
+/// Writes the estimate and its covariance at the field's sites, a pair's at the first frame.
 pub(super) fn fill<T: SimdReal>(
     (estimate, spreads): (&Estimate<T>, Option<CovarianceMaps<T>>),
     space: &PlanePool<T>,

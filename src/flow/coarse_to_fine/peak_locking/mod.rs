@@ -88,8 +88,7 @@ impl PeakLocking {
         });
     }
 
-    /// Remaining bias of the flow and of its derivatives, as shares of the amplitude: `sin` and, per unit of
-    /// the derivative, `2 pi cycles cos`.
+    /// Bias of flow and, per unit, derivatives as shares of the amplitude: `sin`, `2 pi cycles cos`.
     pub fn phase(&self, flow: f64) -> (f64, f64) {
         let (sine, cosine) = (TAU * self.cycles * flow).sin_cos();
         (sine, TAU * self.cycles * cosine)
@@ -209,8 +208,7 @@ struct Warped {
 }
 
 impl Warped {
-    /// Residual, entry of the normal matrix and right side along the axis `c`, of the same rows as in the
-    /// data term.
+    /// Residual, entry of the normal matrix and right side along the axis `c`, as in the data term.
     fn row(&self, i: usize, c: usize) -> (f64, f64, f64) {
         let gradient = DataOptions::default().gradient.powi(2);
         // Steps along the axis and across it.

@@ -15,8 +15,7 @@ use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 const MIN_WEIGHT: f64 = 1e-2;
 /// Minimum noise density, px^4: below that of any real frame.
 const MIN_NOISE_DENSITY: f64 = 1e-9;
-/// Step of the ladder from which unrest is measured: wider than what regularisation smooths, narrower than
-/// the curvature of smooth flow.
+/// Step of the ladder from which unrest is measured: wider than what regularisation smooths.
 const UNREST_WINDOW: usize = 2;
 /// Share of the measured change that counts as unrest.
 const UNREST_SHARE: f64 = 0.8;
@@ -170,8 +169,7 @@ impl<T: SimdReal> Kernel<T> for Weights<'_, T> {
 }
 
 impl<T: SimdReal> Climb<'_, T> {
-    /// Unrest of the flow, at least 1: its change from one narrow window to the next, over that of white
-    /// noise.
+    /// Unrest of the flow, at least 1: its change between narrow windows, over that of white noise.
     #[inline(always)]
     fn unrest<V: Lanes<Scalar = T>>(&self, density: V, means: &[T]) -> V {
         let one = V::constant(1.0);
@@ -230,8 +228,7 @@ fn power4<V: Lanes>(value: V) -> V {
     square * square
 }
 
-/// Noise density of the flow, px^2 per px^-2: the residual energy over the information, averaged over
-/// directions (trace of its inverse).
+/// Noise density of the flow, px^2 per px^-2: residual energy by the trace of inverse information.
 #[inline(always)]
 fn density<V: Lanes>(means: &[V::Scalar], stride: usize) -> V {
     let (uu, uv, vv) = (V::load(means), V::load(&means[stride..]), V::load(&means[2 * stride..]));

@@ -15,8 +15,7 @@ use std::ops::Range;
 
 /// Minimum weight of edge fits; smaller ones are set to 0, so that smooth areas skip them.
 const MIN_EDGE_SHARE: f64 = 0.2;
-/// Maximum relative misfit, at which only edge fits count: the sixth power of more overflows in single
-/// precision.
+/// Maximum relative misfit, at which only edge fits count: keeps sixth powers in single precision.
 const MAX_MISFIT: f64 = 1e5;
 /// Share of the Laplacian of the flow and of its slopes, sites^2, that the fixed windows of data term and
 /// regularisation smooth away (1 px^2, and less for slopes, which lose more by it at motion boundaries than

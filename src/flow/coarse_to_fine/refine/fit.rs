@@ -159,8 +159,7 @@ pub(super) fn halve<T: SimdReal>(simd: Level, space: &PlanePool<T>, from: &Field
     out
 }
 
-/// Extends a flow beyond the frame and completes its third plane, which holds the variance that smoothing
-/// removed.
+/// Extends a flow beyond the frame and completes its third plane, the variance smoothed away.
 pub(super) fn finish<T: SimdReal>(flow: &mut Field<T>) {
     flow.extend(0..2, Continuation::Odd, RIM);
     flow.extend(2..3, Continuation::Even, RIM);

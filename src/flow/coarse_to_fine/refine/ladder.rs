@@ -11,8 +11,7 @@ pub(super) const MAX_OCTAVE: usize = 2;
 const VARIANCE_STEPS: usize = 12;
 /// Maximum sigma of a window on a grid, sites; the next grid is fine enough for wider ones.
 const MAX_GRID_SIGMA: f64 = 2.9;
-/// Variance of the Gaussian before a grid is halved, sites^2: aliases onto slow variation are damped a
-/// thousand times.
+/// Variance of the Gaussian before a grid is halved, sites^2: damps aliases a thousand times.
 const HALVING_VARIANCE: f64 = 1.5;
 
 /// Coefficients of `G, G^2, ...`: `4 G - 6 G^2 + 4 G^3 - G^4 = 1 - (1 - G)^4`.
@@ -20,8 +19,7 @@ pub(in crate::flow::coarse_to_fine) const TERMS: [f64; 4] = [4.0, -6.0, 4.0, -1.
 /// Passes after the first.
 pub(super) const EXTRA_PASSES: usize = TERMS.len() - 1;
 
-/// One-dimensional filters `[g, g k / (pitch sum g k^2)]` at distance k: the mean, and the slope of a
-/// weighted straight line.
+/// Filters `[g, g k / (pitch sum g k^2)]` at distance k: mean and slope of a weighted line.
 #[derive(Debug, Clone)]
 pub(super) struct Taps<T> {
     /// Distance 0 ..= radius; the third filter of the type is not used.
@@ -50,8 +48,7 @@ impl<T: SimdReal> Taps<T> {
     fn cut_off(sigma: f64, radius: usize, pitch: f64) -> Self {
         let g = weights(sigma, radius);
         let variance = 2.0 * moment(&g, 2);
-        // Truncation takes more from the fourth moment than from the second: the Gaussian of the slope is
-        // widened to compensate.
+        // Truncation takes most from the fourth moment: the Gaussian of the slope is widened for it.
         let mut slope = sigma;
         for _ in 0..VARIANCE_STEPS {
             let h = weights(slope, radius);
@@ -125,8 +122,7 @@ impl<T: SimdReal> Ladder<T> {
     }
 }
 
-/// Variance of the difference between the estimates of two windows, for white noise of unit density (per
-/// px^2); the second may be infinite.
+/// Variance of the difference of two windows' estimates, for white noise of unit density (per px^2).
 ///
 /// With the transfer functions `H = 1 - (1 - G)^4`, `G = exp(-sigma^2 w^2 / 2)`, it is `integral (H_a -
 /// H_b)^2 w dw / (2 pi)`, each term of which is a Gaussian.

@@ -33,8 +33,7 @@ pub(in crate::flow::coarse_to_fine) struct RefineOptions {
     pub noise_region: f64,
     /// Relative misfit at which edge fits and plain fits count equally.
     pub edge_misfit: f64,
-    /// Relative misfit at which slopes are half those of wider edge fits: at a motion step, the slope of a
-    /// window's fit is no slope of the motion.
+    /// Relative misfit at which slopes are half those of wider edge fits.
     pub step_misfit: f64,
     /// Whether the field may be affine over the whole frame: zero is then one more choice beyond the widest
     /// window.

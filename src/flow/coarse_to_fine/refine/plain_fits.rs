@@ -11,8 +11,7 @@ use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Minimum weight of the narrowest window of a coarse grid: interpolation to finer grids needs values
-/// everywhere.
+/// Minimum weight of the narrowest window of a coarse grid, for interpolation to finer grids.
 const MIN_FIRST_WEIGHT: f64 = 1e-3;
 /// Parts of the motion that plain fits provide.
 const PLAIN: [Use; 2] = [Use::Flow, Use::Slopes];

@@ -52,8 +52,7 @@ enum Item<'a, T> {
     Data(usize),
     /// The fourth root of the residual energy.
     Energy(usize),
-    /// The fourth root, and its inverse, of the squared change from one window to the next, or to zero; each
-    /// with its distance of sites.
+    /// The fourth root, and its inverse, of the squared change from one window to the next, or to zero.
     Change((&'a Field<T>, usize), Option<(&'a Field<T>, usize)>),
     /// The inverse fourth root of the misfit.
     Misfit(&'a Field<T>, usize),

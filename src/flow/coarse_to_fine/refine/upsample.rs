@@ -10,8 +10,7 @@ use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::ops::Range;
 
-/// Plane `k` of the choice along row `y` of the grid `octave`, interpolated linearly; from the start of `out`
-/// on. `down` holds a line.
+/// Plane `k` of the choice along row `y` of the grid `octave`, linear, to `out`; `down` holds a line.
 #[inline(always)]
 pub(super) fn widen<V: Lanes>(
     choice: &Choice<V::Scalar>,
@@ -50,8 +49,7 @@ fn along<T: SimdReal, const F: usize>(from: &[T], width: usize, out: &mut [T]) {
     }
 }
 
-/// Plane `k` of a grid of every second site, interpolated by cubics through four sites to row `y` of `width`
-/// sites; from the start of `out` on.
+/// Plane `k` of a grid of every second site, by cubics to row `y` of `width` sites, to `out`.
 #[inline(always)]
 pub(super) fn grow_row<V: Lanes>(
     from: &Field<V::Scalar>,

@@ -52,8 +52,7 @@ impl<T: SimdReal> WindowStatistics<T> {
         at(&self.means, Layout::ENERGY, x, y).powi(4)
     }
 
-    /// Weights of the window `l` in the flow and in the slopes; each sums to 1, or less where the field
-    /// vanishes.
+    /// Weights of the window `l` in flow and slopes; each sums to 1, or less where the field vanishes.
     pub fn weights(&self, l: usize, x: usize, y: usize) -> [f64; 2] {
         [Use::Flow, Use::Slopes].map(|of| at(&self.choice, self.order.weight(of, l), x, y))
     }
@@ -64,8 +63,7 @@ impl<T: SimdReal> WindowStatistics<T> {
         weights.fold([0.0; 2], |sum, w| [sum[0] + w[0], sum[1] + w[1]])
     }
 
-    /// Regional squared change of the flow from the window `l` to the next, over that of white noise of unit
-    /// density: a density, px^4.
+    /// Regional squared change from the window `l` to the next, as a noise density, px^4.
     pub fn change(&self, l: usize, x: usize, y: usize) -> f64 {
         at(&self.means, Layout::change(l), x, y).powi(4) / difference_variance(self.sigmas[l], self.sigmas[l + 1])
     }

@@ -108,8 +108,7 @@ fn typical_energy<T: SimdReal>(data: &Planes<T>, floor: T, energies: &mut Vec<T>
     median(energies).map_or(floor, |energy| Lanes::max(energy, floor))
 }
 
-/// Copies the flow to `start`, and clears the samples beside the motion's sites, since lanes there compute
-/// too.
+/// Copies the flow to `start`, and clears the samples beside the sites, where lanes compute too.
 fn save_flow<T: SimdReal>(motion: &mut Planes<T>, start: &mut Planes<T>) {
     let (width, height) = (motion.width, motion.height);
     start.reshape(width, height, 2);

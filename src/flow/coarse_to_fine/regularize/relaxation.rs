@@ -108,8 +108,7 @@ fn less_row<V: Lanes<Scalar = T>, T: SimdReal>(block: &[T], i: usize, m: &[V; 6]
     f.neg_mul_add(m[5], e.neg_mul_add(m[4], start))
 }
 
-/// Solves the equations of each site of the row `own`, its neighbours fixed; those in the row have their
-/// values from before the visit.
+/// Solves the equations of each site of the row `own`; its neighbours have their values from before.
 #[inline(always)]
 pub(super) fn relax_row<V: Lanes<Scalar = T>, T: SimdReal>(
     problem: &SmoothnessProblem<'_, T>,

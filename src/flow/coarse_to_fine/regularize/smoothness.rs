@@ -5,8 +5,7 @@ use super::{HALF_SPACING, Smoothness};
 use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
 use crate::simd::{Lanes, SimdReal};
 
-/// The values of an expression for each index in a list, written out: the optimiser does not unroll loops
-/// with bodies of this size.
+/// The values of an expression for each index in a list, written out: no optimiser unrolls these.
 macro_rules! each {
     ($index:ident in [$($value:literal)*] => $expression:expr) => {
         [$({ let $index: usize = $value; $expression }),*]

@@ -26,11 +26,9 @@ pub(super) const PLACES: [(usize, usize); ENTRIES] = {
     places
 };
 
-/// Keeps pivots positive: each diagonal entry grows by a share of itself above its rounding error, and by a
-/// constant far below any data term.
+/// Keeps pivots positive: each grows by a share above its rounding error, and by a tiny constant.
 ///
-/// The unknowns are increments, so that neither moves the solution that relaxation converges to: both only
-/// shorten undetermined steps.
+/// The unknowns are increments: both only shorten undetermined steps.
 pub(super) struct Guard<V> {
     share: V,
     least: V,
@@ -45,8 +43,7 @@ impl<V: Lanes> Guard<V> {
     }
 }
 
-/// Factorises a positive semidefinite matrix, given by its lower triangle, into `L D L^T`: `L` below the
-/// diagonal, on it the inverse of `D`.
+/// Factorises a matrix, given by its lower triangle, into `L` below the diagonal and `1 / D` on it.
 ///
 /// Pivots are taken in pairs, which share one division: with the leading block `[[a, b], [b, c]]` and its
 /// determinant `d` they are `a` and `d / a`, and their inverses follow from `1 / (a d)`.

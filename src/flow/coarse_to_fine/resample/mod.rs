@@ -12,8 +12,7 @@ use rows::RowReader;
 /// Rows of a parallel task.
 const ROWS: usize = 32;
 
-/// Affine motions of the sites around a position, each evaluated with half its lever, blended by distance:
-/// exact where slopes change linearly.
+/// Affine motions of the sites around a position, each with half its lever, blended by distance.
 ///
 /// `(x, y)`: px of the level whose sites are `step` px apart; beyond the last site its model is extrapolated.
 pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, step: f64, x: f64, y: f64) -> [f64; MOTION] {
@@ -44,8 +43,7 @@ pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, step: f64, x: f64, y: f
     blend
 }
 
-/// Motion on the sites (every second pixel) of the level twice as fine, of `size` pixels: flow doubles, the
-/// Jacobian stays.
+/// Motion on the sites of the level twice as fine, of `size` pixels: flow doubles.
 ///
 /// The fine level's site `(x, y)` is its pixel `(2 x, 2 y)`, which is the coarse level's pixel `(x, y)`.
 pub(super) fn finer<T: SimdReal>(simd: Level, coarse: &Planes<T>, size: (usize, usize), fine: &mut Planes<T>) {
@@ -88,8 +86,7 @@ impl<T: SimdReal> Kernel<T> for Finer<'_, T> {
     }
 }
 
-/// Motion on the `size` sites of the level half as fine: every second site, flow halved. The inverse of
-/// [`finer`].
+/// The inverse of [`finer`], to `size` sites: every second site, flow halved.
 pub(super) fn coarser<T: SimdReal>(fine: &Planes<T>, size: (usize, usize), coarse: &mut Planes<T>) {
     coarse.reshape(size.0, size.1, MOTION);
     for (k, y) in (0..MOTION).flat_map(|k| (0..size.1).map(move |y| (k, y))) {

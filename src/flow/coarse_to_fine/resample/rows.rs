@@ -68,8 +68,7 @@ impl<T: SimdReal> RowReader<T> {
     }
 }
 
-/// Pixels of a row from its sites: linear, or with slopes a parabola with the values of both sites and the
-/// change of their slopes.
+/// Pixels of a row from its sites: linear, or with slopes a parabola.
 #[inline(always)]
 fn widen<T: SimdReal>(sites: &[T], slopes: Option<&[T]>, pixels: &mut [T]) {
     let (half, quarter) = (T::from_f64(0.5), T::from_f64(0.25));
