@@ -43,8 +43,6 @@ pub mod particle;
 mod scalar;
 mod sigma_points;
 mod state;
-#[cfg(test)]
-mod tests;
 mod unscented;
 
 pub use extended::ExtendedFilter;

@@ -313,4 +313,4 @@ impl Shape {
 }
 
 #[cfg(test)]
-pub(super) mod tests;
+mod tests;

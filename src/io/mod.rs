@@ -36,7 +36,7 @@ pub use flo::{read_flo, write_flo};
 pub use flow_image::FlowImage;
 pub use kitti::{read_kitti, write_kitti};
 pub use mot::{MotBox, MotTable, read_mot};
-pub use npy::{Element, ElementType, NpyHeader};
+pub use npy::{Element, ElementType, NpyHeader, write_values};
 pub use numbered::NumberedFiles;
 pub use pfm::{FloatMap, read_pfm, write_pfm};
 pub use picture_png::{write_colour_png, write_frame_png, write_picture};

@@ -227,7 +227,7 @@ macro_rules! elements {
 elements! { u8, U8; u16, U16; u32, U32; i64, I64; f32, F32; f64, F64; }
 
 /// Writes `values` as little-endian bytes, a block at a time.
-pub(crate) fn write_values<T: Element>(values: &[T], out: &mut impl Write) -> io::Result<()> {
+pub fn write_values<T: Element>(values: &[T], out: &mut impl Write) -> io::Result<()> {
     let mut bytes = Vec::new();
     for block in values.chunks(1 << 15) {
         bytes.clear();

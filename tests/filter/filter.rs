@@ -3,6 +3,8 @@
 
 use jacoflow::error::{Error, Result};
 use jacoflow::filter::{ExtendedFilter, GaussianState, KalmanFilter, SigmaPoints, UnscentedFilter};
+use jacoflow::math::random::CounterRng;
+use nalgebra::{DMatrix, DVector};
 
 const Q: [f64; 4] = [1e-3, 1e-3, 1e-2, 1e-3];
 
@@ -228,4 +230,97 @@ fn noise_may_differ_from_state_to_state() {
     filter.Q = [diagonal(&Q), diagonal(&Q.map(|q| 2.0 * q))].concat();
     filter.predict().unwrap();
     assert!((filter.P[16] - filter.P[0] - Q[0]).abs() < 1e-15);
+}
+
+#[test]
+fn on_a_linear_system_all_filters_are_one() {
+    let mut linear = linear_filter(3);
+    let (f, h) = (linear.F.clone(), linear.H.clone());
+    let product = |matrix: &[f64], points: &[f64], out: &mut [f64]| {
+        let rows = matrix.len() / 4;
+        for (p, out) in points.chunks_exact(4).zip(out.chunks_exact_mut(rows)) {
+            for (row, out) in matrix.chunks_exact(4).zip(out) {
+                *out = row.iter().zip(p).map(|(m, p)| m * p).sum();
+            }
+        }
+        Ok(())
+    };
+    let mut unscented = UnscentedFilter::new(3, 4, 2, SigmaPoints::new(0.7, 2.0, 1.0).unwrap()).unwrap();
+    let mut augmented = UnscentedFilter::new(3, 4, 2, SigmaPoints::default()).unwrap();
+    let mut extended = ExtendedFilter::new(3, 4, 2).unwrap();
+    for state in [&mut unscented.state, &mut augmented.state, &mut extended.state] {
+        set_up(state);
+    }
+    let rng = CounterRng::new(5);
+    for t in 0..40 {
+        let z: Vec<f64> = (0..6).map(|k| rng.normal(t * 6 + k)).collect();
+        linear.predict().unwrap();
+        linear.update(&z).unwrap();
+        unscented.predict(|p, out| product(&f, p, out)).unwrap();
+        unscented.update(&z, |p, out| product(&h, p, out)).unwrap();
+        augmented
+            .predict_augmented(|p, w, out| {
+                product(&f, p, out)?;
+                out.iter_mut().zip(w).for_each(|(out, w)| *out += w);
+                Ok(())
+            })
+            .unwrap();
+        augmented.update(&z, |p, out| product(&h, p, out)).unwrap();
+        extended.predict_by_differences(|p, out| product(&f, p, out)).unwrap();
+        extended.update_by_differences(&z, |p, out| product(&h, p, out)).unwrap();
+        for other in [&unscented.state, &augmented.state, &extended.state] {
+            let pairs = linear.x.iter().chain(&linear.P).chain(&linear.log_likelihood);
+            for (a, b) in pairs.zip(other.x.iter().chain(&other.P).chain(&other.log_likelihood)) {
+                assert!((a - b).abs() < 1e-8 * a.abs().max(1.0), "{a} {b}");
+            }
+        }
+    }
+}
+
+#[test]
+fn errors_are_as_large_as_the_filters_say() {
+    // 300 journeys at once: NEES averages the dimension of the state, NIS that of the measurement.
+    let (batch, steps) = (300, 25);
+    let rng = CounterRng::new(42);
+    let draw = |stream: u64, b: usize, k: usize| rng.stream(stream).normal((b * 8 + k) as u64);
+    let mut truth: Vec<f64> =
+        (0..batch * 4).map(|i| X0[i % 4] + (0.2 * P0[i % 4]).sqrt() * draw(0, i / 4, i % 4)).collect();
+    let mut unscented = UnscentedFilter::new(batch, 4, 2, SigmaPoints::default()).unwrap();
+    let mut extended = ExtendedFilter::new(batch, 4, 2).unwrap();
+    for state in [&mut unscented.state, &mut extended.state] {
+        set_up(state);
+        state.P = diagonal(&P0.map(|p| 0.2 * p)).repeat(batch);
+    }
+    let (mut nees, mut nis) = ([0.0; 2], [0.0; 2]);
+    for t in 1..=steps {
+        let mut next = vec![0.0; truth.len()];
+        travel(&truth, &mut next).unwrap();
+        truth = (0..next.len()).map(|i| next[i] + Q[i % 4].sqrt() * draw(2 * t, i / 4, i % 4)).collect();
+        let mut z = vec![0.0; batch * 2];
+        sight(&truth, &mut z).unwrap();
+        for (i, z) in z.iter_mut().enumerate() {
+            *z += R[i % 2].sqrt() * draw(2 * t + 1, i / 2, i % 2);
+        }
+        unscented.predict(travel).unwrap();
+        unscented.update(&z, sight).unwrap();
+        extended.predict(travel, travel_jacobian).unwrap();
+        extended.update(&z, sight, sight_jacobian).unwrap();
+        for (k, state) in [&unscented.state, &extended.state].into_iter().enumerate() {
+            for b in 0..batch {
+                let squared = |matrix: &[f64], error: &[f64]| {
+                    let error = DVector::from_row_slice(error);
+                    let matrix = DMatrix::from_row_slice(error.len(), error.len(), matrix);
+                    error.dot(&matrix.cholesky().unwrap().solve(&error))
+                };
+                let error: Vec<f64> = (0..4).map(|i| state.x[b * 4 + i] - truth[b * 4 + i]).collect();
+                nees[k] += squared(&state.P[b * 16..(b + 1) * 16], &error);
+                nis[k] += squared(&state.S[b * 4..(b + 1) * 4], &state.y[b * 2..(b + 1) * 2]);
+            }
+        }
+    }
+    let count = (batch as u64 * steps) as f64;
+    for k in 0..2 {
+        assert!((3.6..4.4).contains(&(nees[k] / count)), "NEES {}", nees[k] / count);
+        assert!((1.85..2.15).contains(&(nis[k] / count)), "NIS {}", nis[k] / count);
+    }
 }

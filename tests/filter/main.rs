@@ -4,3 +4,4 @@ mod filter;
 mod particle;
 mod particle_resampling;
 mod particle_weights;
+mod soundness;

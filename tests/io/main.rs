@@ -23,6 +23,7 @@ mod sink_y4m;
 mod source;
 mod source_files;
 mod source_memory;
+mod source_npy;
 mod source_select;
 mod source_views;
 mod source_y4m;

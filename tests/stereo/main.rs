@@ -3,3 +3,4 @@
 mod edges;
 mod options;
 mod row_offset;
+mod sequence_rows;

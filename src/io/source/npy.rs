@@ -181,6 +181,3 @@ impl<P: ChannelPolicy> FrameSource<P::Frame> for NpySource<P> {
         format!("{} (numpy stack of {} frames, {} x {})", self.path.display(), self.frames, self.width, self.height)
     }
 }
-
-#[cfg(test)]
-mod tests;

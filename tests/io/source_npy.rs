@@ -1,9 +1,12 @@
-use super::*;
-use crate::io::Grey;
-use crate::io::npy::write_values;
-use crate::types::{AnyColourFrame, AnyFrame, Frame};
+//! `.npy` stacks, read a few frames at a time.
+
+use jacoflow::error::Error;
+use jacoflow::io::{Colour, Element, ElementType, FrameSource, Grey, NpyHeader, NpySource, write_values};
+use jacoflow::types::{AnyColourFrame, AnyFrame, Frame};
 use proptest::prelude::*;
+use std::fs::File;
 use std::io::Write;
+use std::path::{Path, PathBuf};
 
 fn save<T: Element>(folder: &Path, header: &NpyHeader, values: &[T]) -> PathBuf {
     let path = folder.join("stack.npy");

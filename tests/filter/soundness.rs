@@ -1,6 +1,7 @@
 //! What is refused, and what is mended.
 
-use super::*;
+use jacoflow::error::Error;
+use jacoflow::filter::{KalmanFilter, SigmaPoints, UnscentedFilter};
 
 #[test]
 fn a_lost_covariance_is_mended_and_counted() {
