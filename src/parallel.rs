@@ -9,8 +9,7 @@ use std::sync::{Arc, Mutex};
 /// Rows of one task. Fixed, so that the split never depends on the number of threads.
 pub const BAND_ROWS: usize = 16;
 
-/// Largest buffer, values, that work outside every pool keeps on the caller's thread: waking a pool takes
-/// longer than the work.
+/// Largest buffer, values, that is worked on by the caller's thread: waking a pool takes longer.
 const MAX_SERIAL: usize = 1 << 16;
 
 /// The environment variable that sets the number of threads.
@@ -49,8 +48,7 @@ impl Threads {
         Ok(self)
     }
 
-    /// The number of threads this resolves to: the requested number, at most [`MAX_PER_PROCESSOR`] for
-    /// each processor.
+    /// The number of threads this resolves to, at most [`MAX_PER_PROCESSOR`] for each processor.
     ///
     /// More would only cost memory, and thousands can bring a machine to its knees.
     pub fn count(self) -> usize {
@@ -140,8 +138,7 @@ impl<T: Default + Send + Sync> PerProcess<T> {
 /// Calls `work(band, rows, band_slice)` for every band of [`BAND_ROWS`] rows of a row-major buffer with
 /// `row_len` values a row.
 ///
-/// Call it inside [`Threads::install`]; outside, small buffers are worked on by the caller and others by as
-/// many threads as by default.
+/// Call it inside [`Threads::install`]; outside, small buffers are worked on by the caller.
 pub fn for_each_band<T: Send>(
     buffer: &mut [T],
     row_len: usize,

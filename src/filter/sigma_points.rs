@@ -76,8 +76,7 @@ impl SigmaPoints {
         weights
     }
 
-    /// The points of mean `x` `(n)` and Cholesky factor `l` `(n, n)`, lower: `(2 n + 1, n)` values, centre
-    /// first, then every `+`, then every `-`.
+    /// The points `(2 n + 1, n)` of mean `x` and lower Cholesky factor `l`: centre, every `+`, every `-`.
     pub(super) fn draw(&self, x: &[f64], l: &[f64], out: &mut [f64]) {
         let n = x.len();
         let scale = self.spread(n).sqrt();

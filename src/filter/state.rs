@@ -75,8 +75,7 @@ impl GaussianState {
         check_covariances("R", &self.R, m)
     }
 
-    /// Mends the covariance of one state after a step if it is none any more, and counts that; refuses
-    /// numbers that have become infinite.
+    /// Mends the covariance of one state after a step if needed, and counts that; refuses infinite numbers.
     fn keep_sound(&mut self, item: usize) -> Result<()> {
         let n = self.dim_x;
         let (x, p) = (&self.x[item * n..(item + 1) * n], &mut self.P[item * n * n..(item + 1) * n * n]);
@@ -213,8 +212,7 @@ pub(crate) fn check_mean(x: &[f64]) -> Result<()> {
     }
 }
 
-/// Refuses `(n, n)` matrices, one after another, that are no covariances: finite, symmetric, no negative
-/// eigenvalue but by rounding.
+/// Refuses `(n, n)` matrices that are not finite, symmetric and positive semi-definite to rounding.
 ///
 /// # Errors
 /// [`Error::Argument`] naming `name` and what is wrong.

@@ -51,8 +51,7 @@ pub struct MethodInfo {
     pub time_schemes: &'static [&'static str],
     /// Motion models, the default first.
     pub models: &'static [ModelKind],
-    /// Whether it smooths the frames itself (`smooth`), after it has measured their noise; they must not be
-    /// smoothed before.
+    /// Whether it smooths the frames itself (`smooth`), after it has measured their noise.
     pub smooths_frames: bool,
     /// Whether its fields have a covariance.
     pub has_covariance: bool,

@@ -17,8 +17,7 @@ pub enum Condition {
     /// No condition holds: `(u, v)` and the Jacobian are not all determined.
     #[default]
     Neither = 0,
-    /// (i): the Hessian of I is regular and the flow is not zero, or M is not a multiple of the identity, or
-    /// M and the gradient are not zero.
+    /// (i): regular Hessian and flow, or M no multiple of the identity, or M and gradient not zero.
     RegularHessian = 1,
     /// (ii): the gradient and its time derivative are independent (28), even where the Hessian vanishes.
     TurningGradient = 2,

@@ -3,8 +3,7 @@
 /// How an image continues beyond its edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Border {
-    /// Mirrored about the outer side of the last pixel: `d c b a | a b c d | d c b a` (scipy's `reflect`).
-    /// The default.
+    /// Mirrored about the last pixel's side: `d c b a | a b c d | d c b a` (scipy's `reflect`).
     #[default]
     Reflect,
     /// The last pixel repeated: `a a a a | a b c d | d d d d` (scipy's `nearest`).

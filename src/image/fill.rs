@@ -5,8 +5,7 @@ use crate::parallel::for_each_band;
 use crate::types::{Frame, Mask};
 use std::borrow::Cow;
 
-/// Which pixels of `frame` are finite and allowed by `usable`. A mask of another size allows everything: to
-/// refuse it is for others.
+/// Which pixels of `frame` are finite and allowed by `usable`; a mask of another size allows all.
 pub(crate) fn usable_pixels<T: Real>(frame: &Frame<T>, usable: Option<&Mask>) -> Mask {
     let mut mask = match usable {
         Some(usable) if usable.size() == frame.size() => usable.clone(),

@@ -4,8 +4,7 @@ use super::{GaussianSmoother, Quantiser};
 use crate::simd::SimdReal;
 use crate::types::{Frame, Mask};
 
-/// What is done to each frame before estimation: quantise, then smooth (WO2010/098160, figure 1). Nothing by
-/// default.
+/// What is done to each frame first: quantise, then smooth (WO2010/098160, figure 1).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Preprocess {
     /// Rounding down to grey levels, as a camera does.
@@ -19,8 +18,7 @@ pub struct Preprocess {
 impl Preprocess {
     /// The frame after both steps; handed through untouched when there are none.
     ///
-    /// Call it inside [`Threads::install`](crate::parallel::Threads::install) to choose the number of
-    /// threads.
+    /// [`Threads::install`](crate::parallel::Threads::install) chooses the number of threads.
     pub fn apply<T: SimdReal>(&self, frame: Frame<T>) -> Frame<T> {
         let frame = match &self.quantise {
             Some(quantiser) => quantiser.apply(&frame),

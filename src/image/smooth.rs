@@ -79,8 +79,7 @@ impl GaussianSmoother {
 
     /// The smoothed frame.
     ///
-    /// Call it inside [`Threads::install`](crate::parallel::Threads::install) to choose the number of
-    /// threads.
+    /// [`Threads::install`](crate::parallel::Threads::install) chooses the number of threads.
     pub fn apply<T: SimdReal>(&self, frame: &Frame<T>) -> Frame<T> {
         self.apply_at(Level::detect(), frame)
     }

@@ -151,8 +151,7 @@ macro_rules! table_endings {
 }
 pub(in crate::io) use table_endings;
 
-/// One row a site: frame, x, y, status, the motion parameters, and the standard deviation of each where the
-/// field has covariance.
+/// One row a site: frame, x, y, status, parameters, and standard deviations if there is covariance.
 #[derive(Debug)]
 pub struct FieldTable {
     table: TableWriter,

@@ -154,8 +154,7 @@ impl AtomicFile {
 }
 
 impl AtomicFile {
-    /// As [`AtomicFile::commit`], under another name in the same folder: for what an interrupted run has got
-    /// so far.
+    /// As [`AtomicFile::commit`], under another name in the same folder: for an interrupted run.
     pub fn commit_as(mut self, path: impl AsRef<Path>) -> Result<()> {
         self.target = path.as_ref().to_path_buf();
         self.commit()
@@ -198,8 +197,7 @@ impl Seek for Inner {
     }
 }
 
-/// Writes a whole file: `write` fills it, then it gets its name. On an error nothing is left behind and what
-/// was there before is kept.
+/// Writes a whole file: `write` fills it, then it gets its name. An error keeps what was there.
 pub fn atomic<R>(path: impl AsRef<Path>, write: impl FnOnce(&mut AtomicFile) -> Result<R>) -> Result<R> {
     let mut file = AtomicFile::create(path)?;
     let result = write(&mut file)?;

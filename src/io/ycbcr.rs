@@ -99,8 +99,7 @@ mod tests {
     }
 
     proptest! {
-        /// Half a code of rounding in luma and in chroma moves a component by at most `(1 + 1.772) / 2`
-        /// codes.
+        /// Rounding of luma and chroma moves a component by at most `(1 + 1.772) / 2` codes.
         #[test]
         fn colours_survive_within_their_rounding(rgb: [u16; 3], bits in 8_u32..=16, full_range: bool) {
             let coding = Coding::new(bits, full_range);

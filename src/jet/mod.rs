@@ -1,5 +1,4 @@
-//! The local 2-jet of brightness, `i = (I, Ix, Iy, Ixx, Ixy, Iyy)`: brightness and its five first and second
-//! derivatives at a pixel.
+//! The local 2-jet of brightness, `i = (I, Ix, Iy, Ixx, Ixy, Iyy)`, at a pixel.
 //!
 //! It is the least-squares quadratic through a neighbourhood (WO2010/098160, (32), (33) for 3x3; paragraph
 //! 0081 for others). A rectangle of any size is computed separably, a free set of points directly. For white

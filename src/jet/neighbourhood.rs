@@ -2,14 +2,12 @@
 
 use crate::error::{Error, Result};
 
-/// Longest side of a rectangle and largest offset of a point, px: beyond it a quadratic describes nothing,
-/// and sums of fourth powers lose digits.
+/// Longest side of a rectangle and largest offset of a point, px: sums of fourth powers lose digits.
 const LARGEST: usize = 257;
 
 /// The pixels around a site that its jet is fitted to.
 ///
-/// With `sigma` each pixel weighs `exp(-(ex^2 + ey^2) / (2 sigma^2))` in the fit, `(ex, ey)` being its offset
-/// in px; without, all weigh the same.
+/// With `sigma` a pixel at `(ex, ey)` px weighs `exp(-(ex^2 + ey^2) / (2 sigma^2))` in the fit.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Neighbourhood {
     /// `width x height` pixels, each at least 3. An odd side is centred at the site. An even side `n` covers
@@ -59,8 +57,7 @@ impl Neighbourhood {
         self
     }
 
-    /// Root mean square distance along one axis of the (weighted) pixels from their mean, px: how wide a
-    /// Gaussian blurs as the fit does.
+    /// Root mean square distance along one axis of the (weighted) pixels from their mean, px.
     pub fn spread(&self) -> f64 {
         let weigh = |&(x, y): &(i32, i32)| {
             let squared = f64::from(x).powi(2) + f64::from(y).powi(2);
@@ -83,8 +80,7 @@ impl Neighbourhood {
         }
     }
 
-    /// Refuses sizes, offsets and weights that cannot be fitted to; the rank is checked where the design is
-    /// factored.
+    /// Refuses sizes, offsets and weights that cannot be fitted to (the rank is checked later).
     pub(super) fn check(&self) -> Result<()> {
         if let Some(sigma) = self.sigma()
             && !(sigma.is_finite() && sigma > 0.0)

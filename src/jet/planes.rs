@@ -8,8 +8,7 @@ use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch, same, same_mut};
 use crate::types::Frame;
 use rayon::prelude::*;
 
-/// Six planes of the size of the frame: `I, Ix, Iy, Ixx, Ixy, Iyy`; NaN where the neighbourhood leaves the
-/// frame.
+/// Six planes of the size of the frame: `I, Ix, Iy, Ixx, Ixy, Iyy`; NaN along the border.
 #[derive(Debug, Clone, PartialEq)]
 pub struct JetPlanes<T> {
     /// The planes, in the jet's order.

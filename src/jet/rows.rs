@@ -3,11 +3,9 @@
 use super::stencil::{JetStencil, Reach};
 use crate::simd::{Lanes, SimdReal};
 
-/// Starts of the vectors that cover `range`: the last one is moved back so that it ends with the range, and
-/// overlaps its neighbour.
+/// Starts of the vectors that cover `range`: the last one is moved back to end with the range.
 ///
-/// For maps only (each output depends on inputs alone): the overlap is computed twice. Yields nothing for a
-/// range shorter than a vector.
+/// For maps only: the overlap is computed twice. Yields nothing for a range shorter than a vector.
 #[inline(always)]
 pub(crate) fn starts(range: std::ops::Range<usize>, lanes: usize) -> Starts {
     let fits = range.end >= range.start + lanes;
@@ -89,11 +87,9 @@ impl<T: SimdReal> JetRows<T> {
         }
     }
 
-    /// Jets of row `y` of a row-major image `width` wide, written to the six rows of `out` (`6 * width`
-    /// values, component by component).
+    /// Jets of row `y` of a row-major image `width` wide, to the six rows of `out`.
     ///
-    /// Only columns whose neighbourhood fits are written; the row's must. `scratch` holds
-    /// [`JetRows::scratch_len`] values.
+    /// Writes columns whose neighbourhood fits. `scratch` holds [`JetRows::scratch_len`] values.
     #[inline(always)]
     pub fn row<V: Lanes<Scalar = T>>(&self, image: &[T], width: usize, y: usize, scratch: &mut [T], out: &mut [T]) {
         let inside = self.reach.left..width.saturating_sub(self.reach.right).max(self.reach.left);

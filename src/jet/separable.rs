@@ -30,8 +30,7 @@ impl Axis {
         };
         let one = |_: f64| 1.0;
         let n0 = dot(&one, &one);
-        // Offsets symmetric about the site have odd moments of exactly zero; summing them would leave
-        // rounding noise.
+        // Offsets symmetric about the site have odd moments of exactly zero, without rounding noise.
         let symmetric = side % 2 == 1;
         let a = if symmetric { 0.0 } else { dot(&one, &|x| x) / n0 };
         let p1 = move |x: f64| x - a;
@@ -55,8 +54,7 @@ impl Axis {
     }
 }
 
-/// The coefficients' way into the jet: row `j` of the result gives component `j` from `(c00, c10, c01, c20,
-/// c11, c02)`.
+/// From coefficients to the jet: row `j` gives component `j` from `(c00, c10, c01, c20, c11, c02)`.
 pub(super) fn taylor(x: &Axis, y: &Axis) -> [[f64; 6]; 6] {
     [
         [1.0, -x.a, -y.a, -x.c, x.a * y.a, -y.c],

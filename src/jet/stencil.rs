@@ -128,8 +128,7 @@ impl JetStencil {
         Some((x, y, map))
     }
 
-    /// The jet at pixel `(x, y)`; NaN where the neighbourhood leaves the frame or holds a sample that is not
-    /// finite.
+    /// The jet at pixel `(x, y)`; NaN where the neighbourhood leaves the frame or is not finite.
     ///
     /// Summed in double precision whatever `T` is.
     pub fn at<T: Real>(&self, frame: &Frame<T>, x: usize, y: usize) -> [T; 6] {
@@ -151,8 +150,7 @@ impl JetStencil {
             }
         }
         jet[0] += base;
-        // 0 * inf is NaN already; a weight of zero on one component must not let a bad sample pass in
-        // another.
+        // A weight of zero on one component must not let a bad sample pass in another.
         if jet.iter().all(|v| v.is_finite()) { jet } else { [f64::NAN; 6] }
     }
 
@@ -186,8 +184,7 @@ impl JetStencil {
         Some(left / self.freedom)
     }
 
-    /// The rows `[1, ex, ey, ex^2/2, ex ey, ey^2/2]` of the design matrix B, offsets in units of the pixel
-    /// pitch.
+    /// The rows `[1, ex, ey, ex^2/2, ex ey, ey^2/2]` of the design matrix B, offsets in pitch units.
     pub fn design(&self) -> Vec<[f64; 6]> {
         let (dx, dy) = self.pitch;
         self.offsets.iter().map(|&(ex, ey)| design_row(f64::from(ex) * dx, f64::from(ey) * dy)).collect()

@@ -6,8 +6,7 @@ use crate::math::Real;
 /// How the first and second time derivative are taken from three jets, and to which frame they belong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TimeScheme {
-    /// At the middle frame: `i' = (i(t0) - i(t0-2)) / 2`, `i'' = i(t0) - 2 i(t0-1) + i(t0-2)`, coefficients
-    /// from `i(t0-1)`. Second-order accurate.
+    /// At the middle frame: `i' = (i(t0) - i(t0-2)) / 2`, `i'' = i(t0) - 2 i(t0-1) + i(t0-2)`.
     #[default]
     Central,
     /// At the newest frame (WO2010/098160, (33)): `i' = i(t0) - i(t0-1)`, the same `i''`, coefficients from

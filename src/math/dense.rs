@@ -120,8 +120,7 @@ pub(crate) fn mend(a: &mut [f64], n: usize) -> Option<bool> {
 
 /// The least eigenvalue of a symmetric matrix where it is negative by more than rounding.
 fn negative_eigenvalue(a: &[f64], n: usize) -> Option<f64> {
-    // With its diagonal raised by what rounding may take, a matrix has a factor: that is cheaper to find out
-    // than eigenvalues.
+    // With its diagonal raised by what rounding may take, a matrix has a factor (cheaper than eigenvalues).
     let mut raised = a.to_vec();
     let diagonal = || (0..n).map(|k| k * (n + 1));
     let shift = 0.5 * ROUNDING * diagonal().fold(0.0f64, |m, k| m.max(a[k]));

@@ -12,8 +12,7 @@ const LARGE: f64 = 10.0;
 const SERIES: [f64; 7] =
     [1.0 / 12.0, -1.0 / 120.0, 1.0 / 252.0, -1.0 / 240.0, 1.0 / 132.0, -691.0 / 32760.0, 1.0 / 12.0];
 
-/// The digamma function `psi(x) = d ln Gamma(x) / dx` for positive x, to about 1e-15 of the larger of 1 and
-/// itself.
+/// The digamma function `psi(x) = d ln Gamma(x) / dx` for positive x, to about 1e-15.
 ///
 /// The recurrence `psi(x) = psi(x + 1) - 1 / x` up to 10, from there `ln x - 1 / (2 x) - sum_n B_2n / (2 n
 /// x^2n)` (Abramowitz and Stegun 1964, 6.3.5 and 6.3.18).

@@ -32,8 +32,7 @@ pub(crate) fn nearest_quantile(values: &mut [f64], share: f64) -> Option<f64> {
     select(values, (share * last as f64).round() as usize)
 }
 
-/// Standard deviation of Gaussian noise whose absolute deviations these are: [`MAD_TO_STD`] times their upper
-/// median; `None` of none.
+/// Standard deviation of Gaussian noise from absolute deviations: [`MAD_TO_STD`] times their median.
 pub(crate) fn robust_std<T: Real>(absolute_deviations: &mut [T]) -> Option<f64> {
     median(absolute_deviations).map(|median| MAD_TO_STD * median.to_f64())
 }

@@ -16,8 +16,7 @@ const AREA: f64 = 0.00492867323399;
 
 static EDGES: LazyLock<[f64; LAYERS + 1]> = LazyLock::new(edges);
 
-/// Right edges of the layers from the lowest, whose edge is that of a rectangle of the same area, to the top,
-/// 0.
+/// Right edges of the layers from the lowest (of a rectangle of the same area) to the top, 0.
 fn edges() -> [f64; LAYERS + 1] {
     let density = |x: f64| (-0.5 * x * x).exp();
     let mut edges = [0.0; LAYERS + 1];
@@ -41,8 +40,7 @@ impl CounterRng {
         }
     }
 
-    /// The number at `index` whose first attempt `bits` lies outside its layer's rectangle; other attempts
-    /// come from a stream of their own.
+    /// The number at `index` whose first attempt `bits` lies outside its layer's rectangle.
     #[cold]
     fn outside(self, edges: &[f64; LAYERS + 1], index: u64, mut bits: u64) -> f64 {
         let rng = self.stream(index);

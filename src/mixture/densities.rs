@@ -6,8 +6,7 @@ use crate::math::dense;
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
-/// Lower Cholesky factors of one matrix a component (the `W_k^-1`, or covariances), and the logarithms of
-/// their determinants.
+/// Lower Cholesky factors of one matrix a component, and the logarithms of their determinants.
 #[derive(Debug)]
 pub(super) struct Factors {
     pub lower: Vec<f64>,
@@ -45,8 +44,7 @@ pub(super) struct Densities {
 }
 
 impl Densities {
-    /// Those of `factor_k N(x; mean_k, covariance_k)`, from the factors' logarithms (K), means (K, D) and
-    /// Cholesky factors of the covariances.
+    /// Those of `factor_k N(x; mean_k, covariance_k)`, from log factors, means and Cholesky factors.
     pub fn gaussian(log_factors: &[f64], means: &[f64], factors: &Factors) -> Self {
         let (components, d) = (log_factors.len(), means.len() / log_factors.len());
         let mut whitening = Vec::with_capacity(components * d * (d + 1) / 2);

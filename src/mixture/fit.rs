@@ -20,8 +20,7 @@ pub enum Start<'a> {
     Seeds,
     /// With an M step from these responsibilities (N, K), row-major.
     Responsibilities(&'a [f64]),
-    /// With an E step under these components, of which there may be another number than
-    /// [`MixtureOptions::components`].
+    /// With an E step under these components, of any number.
     Components(&'a Posterior),
 }
 
@@ -32,8 +31,7 @@ pub struct Fit {
     pub posterior: Posterior,
     /// The prior, with what was taken from the points.
     pub prior: Prior,
-    /// The lower bound after each M step, natural logarithms. It never falls, unless components were left
-    /// out.
+    /// The lower bound after each M step. It never falls, unless components were left out.
     pub lower_bounds: Vec<f64>,
     /// Whether the bound stood before the rounds were up.
     pub converged: bool,
@@ -155,8 +153,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// Leaves out components with too few points, but never the last; whether any. Not while earlier points
-    /// hold to their numbering.
+    /// Leaves out components with too few points, but never the last; whether any.
     fn prune(&self, posterior: &mut Posterior, moments: &mut Moments) -> bool {
         if self.options.prune_weight <= 0.0 || self.earlier.is_some() {
             return false;

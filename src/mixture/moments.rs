@@ -95,8 +95,7 @@ impl Moments {
         all
     }
 
-    /// The components in another order: component k of the result is component `order[k]`. Fewer or more than
-    /// all of them are allowed.
+    /// The components in another order, of any length: component k of the result is `order[k]`.
     pub(super) fn reordered(&self, order: &[usize]) -> Self {
         let d = self.dimensions;
         let rows = |values: &[f64], length: usize| -> Vec<f64> {

@@ -5,8 +5,7 @@ use crate::parallel::Threads;
 
 /// Most components: what nobody needs must not take all memory.
 const MAX_COMPONENTS: usize = 1 << 16;
-/// Counts of points that a prior may be worth: of more, logarithms of their gamma functions are no numbers
-/// any more.
+/// Counts of points that a prior may be worth: the logarithm of the gamma function stays finite.
 const MAX_PRIOR: f64 = 1e100;
 /// And of fewer, the bound is none any more.
 const MIN_PRIOR: f64 = 1e-100;
@@ -50,8 +49,7 @@ pub struct MixtureOptions {
     pub covariance_prior: CovariancePrior,
     /// Most rounds of an M step and an E step: 100.
     pub max_iter: usize,
-    /// Rounds end when the lower bound grows by less than this times the sum of the weights: 1e-4. None:
-    /// always `max_iter` rounds.
+    /// Rounds end when the bound grows by less than this times the sum of the weights (1e-4), if given.
     pub tol: Option<f64>,
     /// Fits from different seeds, of which that with the greatest lower bound is kept: 1.
     pub n_init: usize,

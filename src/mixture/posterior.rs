@@ -8,8 +8,7 @@ use crate::error::{Error, Result};
 use crate::math::special::digamma;
 use std::f64::consts::{LN_2, TAU};
 
-/// The posterior of every component: `pi ~ Dir(alpha)` (22), `mu_k ~ N(m_k, (beta_k Lambda_k)^-1)`, `Lambda_k
-/// ~ W(W_k, nu_k)` (24).
+/// `pi ~ Dir(alpha)` (22), `mu_k ~ N(m_k, (beta_k Lambda_k)^-1)`, `Lambda_k ~ W(W_k, nu_k)` (24).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Posterior {
     /// D.
@@ -88,8 +87,7 @@ impl Posterior {
         keep_rows(&mut self.scale_inverses, d * d, keep);
     }
 
-    /// The components called otherwise: component `k` is `names[k]` of the result, and `names` holds each
-    /// number below K once.
+    /// The components renamed: component `k` is `names[k]` of the result.
     #[must_use]
     pub fn renamed(&self, names: &[usize]) -> Self {
         let d = self.dimensions;

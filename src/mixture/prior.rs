@@ -12,8 +12,7 @@ const FLAT: f64 = 1e-10;
 /// What the diagonal of such a covariance is raised by, relative to itself; along an axis without spread,
 /// relative to its mean, or absolutely where no axis has any.
 const RAISED: f64 = 1e-6;
-/// Variances up to this are no spread: their inverses would be near overflow, and squares below it lose their
-/// digits.
+/// Variances up to this are no spread: their inverses would be near overflow.
 const MIN_VARIANCE: f64 = 1e-304;
 
 /// The prior: `pi ~ Dir(alpha0)` (8), `mu_k ~ N(m0, (beta0 Lambda_k)^-1)`, `Lambda_k ~ W(W0, nu0)` (9).

@@ -69,8 +69,7 @@ fn drawn(points: &Points, order: &[usize], distances: &[f64], at: f64) -> Option
     chosen.or(order.last()).copied()
 }
 
-/// Moves centres to the means of the points nearest to them; a centre without points stays. Whether any
-/// moved.
+/// Moves centres to the means of their nearest points; without points they stay. Whether any moved.
 fn lloyd_step(points: &Points, order: &[usize], centres: &mut [f64]) -> bool {
     let d = points.dimensions;
     let mut sums = vec![0.0; centres.len()];

@@ -153,8 +153,7 @@ fn earlier(folder: &Path, stem: &str) -> Vec<PathBuf> {
     entries.map(|entry| entry.path()).filter(ours).collect()
 }
 
-/// Pictures that take the place of earlier ones: they wait in a folder of their own inside the other, which
-/// goes when this is dropped.
+/// Pictures that take the place of earlier ones: they wait in a temporary folder inside the other.
 #[derive(Debug)]
 struct Replacement {
     folder: PathBuf,

@@ -121,8 +121,7 @@ pub struct OutputWish<'a> {
 }
 
 impl OutputPlan {
-    /// Decides from the user's words where results go, and refuses what could only fail later. Nothing is
-    /// made yet.
+    /// Decides from words where results go, and refuses what could only fail later. Nothing is made yet.
     ///
     /// # Errors
     /// [`Error::Argument`] naming `output`, `format` or `picture`; [`Error::Io`] when the place cannot be
@@ -293,15 +292,13 @@ fn with_ending(stem: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Whether a path means a folder: it exists as one, ends in a separator, or has no extension and is no device
-/// or pipe.
+/// Whether a path means a folder: one exists, it ends in a separator, or has no extension.
 pub fn is_folder(path: &Path) -> bool {
     let ends_in_separator = path.to_string_lossy().ends_with(std::path::is_separator);
     path.is_dir() || ends_in_separator || path.extension().is_none() && !is_device(path)
 }
 
-/// Whether a path is neither a folder nor a regular file (a device, a pipe): it is written as it is, with any
-/// its name.
+/// Whether a path is neither a folder nor a regular file (a device, a pipe).
 pub fn is_device(path: &Path) -> bool {
     path.metadata().is_ok_and(|meta| !meta.is_dir() && !meta.is_file())
 }
@@ -319,8 +316,7 @@ fn exists(path: &Path) -> Error {
     Error::argument("output", "a place without earlier results (--force replaces them)", path.display())
 }
 
-/// Refuses, before any work is done, a single file that exists (unless `replace`) or whose folder cannot be
-/// written.
+/// Refuses a single file that exists (unless `replace`) or whose folder cannot be written.
 ///
 /// # Errors
 /// [`Error::Argument`] naming `output`; [`Error::Io`].

@@ -33,8 +33,7 @@ impl Prefetch<[AnyFrame; 2]> {
 }
 
 impl<T: Send + 'static> Prefetch<T> {
-    /// Starts to call `read`. The thread ends with what there is to read, at the first error, or when this
-    /// end is dropped.
+    /// Starts to call `read`. The thread ends at the end, at the first error, or when this is dropped.
     fn of(mut read: impl FnMut() -> Result<Option<T>> + Send + 'static) -> Result<Self> {
         let (sender, frames) = sync_channel(READ_AHEAD);
         std::thread::Builder::new()
@@ -97,8 +96,7 @@ pub struct FirstFrame {
     pub dtype: &'static str,
 }
 
-/// Looks at the first frame of `source` without losing it: what it is (`None`: no frame at all), and the
-/// whole source again.
+/// Looks at the first frame of `source`: what it is (`None`: no frame), and the whole source again.
 pub fn peek<F: FrameFormat>(
     mut source: Box<dyn FrameSource<F>>,
 ) -> Result<(Option<FirstFrame>, Box<dyn FrameSource<F>>)> {

@@ -11,8 +11,7 @@ use crate::types::{AnyFrame, Status};
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Which frames of the input the pushed ones are: frame `k` of the run is frame `start + k * step` of the
-/// input.
+/// Frame `k` of the run is frame `start + k * step` of the input.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Numbering {
     /// Index of the first frame.
@@ -59,8 +58,7 @@ pub struct Summary {
     pub repairs: usize,
     /// Files written.
     pub files: usize,
-    /// The last of them, under the name that it really has: the rows of a run that was stopped have another
-    /// one than requested.
+    /// The last of them, under the name that it really has: that of a stopped run differs.
     pub latest: Option<PathBuf>,
     /// Wall-clock seconds.
     pub seconds: f64,

@@ -77,8 +77,7 @@ const DIRECTIONS: [Direction; 4] = [
     Direction { first: (0, 1), second: (1, 0) },
 ];
 
-/// What must be added to an edge's pixel to reach its second one, by direction, in an image of `width`
-/// columns.
+/// What must be added to an edge's pixel to reach its second one, by direction.
 pub(super) fn second_offsets(width: usize) -> [u32; 4] {
     let width = width as u32;
     // Upper right: modulo 2^32.

@@ -56,8 +56,7 @@ impl<P: SegmentPixel> SegmentImage for Frame<P> {
 
 /// The channels of `image` after a Gaussian of standard deviation `sigma` px.
 ///
-/// A pixel with a channel that is not finite becomes NaN in all channels. It is left out of the smoothing of
-/// its neighbours (normalised convolution).
+/// A pixel with a channel that is not finite becomes NaN in all, and is left out of the smoothing.
 pub(super) fn smoothed<I: SegmentImage>(image: &I, sigma: f64) -> Result<Vec<Frame<I::Real>>> {
     let smoother = GaussianSmoother::new(sigma)
         .map_err(|_| Error::argument("sigma", "a standard deviation of at most 4096 px", sigma))?;

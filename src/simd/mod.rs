@@ -75,8 +75,7 @@ impl Level {
         })
     }
 
-    /// The level that the environment variable `JACOFLOW_SIMD` names (`scalar`, `avx2`, `avx512`); none when
-    /// it is unset or empty.
+    /// The level that `JACOFLOW_SIMD` names (`scalar`, `avx2`, `avx512`); none when unset or empty.
     ///
     /// # Errors
     /// [`Error::Argument`] naming `JACOFLOW_SIMD` for another word or a level that this processor lacks.

@@ -12,8 +12,7 @@ use super::lanes::Lanes;
 use core::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// A whole number added to these stands, with the exponent's bias, in the lowest bits of the sum: `2^23 +
-/// 127`, `2^52 + 1023`.
+/// Added to these, whole numbers stand with the bias in the lowest bits: `2^23 + 127`, `2^52 + 1023`.
 const BIASED_F32: f32 = 8_388_735.0;
 const BIASED_F64: f64 = 4_503_599_627_371_519.0;
 

@@ -7,8 +7,7 @@ use crate::math::median;
 const MIN_MATCHED_SHARE: f64 = 0.3;
 /// Smallest number of edge pixels for a decision.
 const MIN_EDGES: usize = 30;
-/// Median score below which most matches are wrong: above .8 with aligned rows and noise of 2 grey levels,
-/// below .55 with rows two or more apart.
+/// Median score below which most matches are wrong: above .8 if aligned, below .55 two rows apart.
 const MIN_SCORE: f64 = 0.7;
 
 /// Row offset, given or estimated.
@@ -16,8 +15,7 @@ const MIN_SCORE: f64 = 0.7;
 pub struct RowOffset {
     /// `y_right - y_left`, rows.
     pub rows: f64,
-    /// Whether the views have edges and yet disagree at every offset in the range: the true one lies outside,
-    /// or the views do not belong together.
+    /// Whether the views have edges and yet disagree at every offset in the range.
     pub doubtful: bool,
 }
 
@@ -65,8 +63,7 @@ impl Agreement {
         self.edges >= MIN_EDGES && self.matched < MIN_MATCHED_SHARE
     }
 
-    /// Whether too few of enough edge pixels are matched, or the offset is `unsure` otherwise, and the
-    /// matches are poor.
+    /// Whether too few edge pixels are matched, or the offset is `unsure`, and the matches are poor.
     pub fn is_doubtful(&self, unsure: bool) -> bool {
         let poor = self.score.is_some_and(|score| score < MIN_SCORE);
         self.edges >= MIN_EDGES && (unsure || !self.suffices()) && poor

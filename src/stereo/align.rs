@@ -7,8 +7,7 @@ use crate::image::{Border, Interpolation};
 use crate::parallel::for_each_band;
 use crate::types::Frame;
 
-/// The view whose row `y` is row `y + offset` of `view`: cubic convolution between rows, the border
-/// replicated.
+/// The view whose row `y` is row `y + offset` of `view`, by cubic convolution.
 pub(super) fn rows_moved(view: &Frame<f32>, offset: f64) -> Frame<f32> {
     let (width, height) = view.size();
     let whole = offset.floor();

@@ -49,8 +49,7 @@ impl Padded {
     }
 }
 
-/// The best match of every `every`-th edge pixel of `left`, in the order of its lists; `None` where no
-/// candidate is supported.
+/// The best match of every `every`-th edge pixel of `left`; `None` where no candidate is supported.
 ///
 /// `S(p; d, e)` is the number of pixels `q` in the window round `p` with `class_L(q) = class_R(q - (d, -e))`.
 /// A candidate must agree at `p` itself, and half the window must lie in both views. The largest `S` wins,
@@ -162,8 +161,7 @@ fn left_block(left: &Padded, x: usize, y: usize, window: usize) -> ([[u8; LANES]
     (block, classed)
 }
 
-/// In how many pixels of the window the right classes equal the left ones; `right` begins at the window's
-/// first pixel.
+/// In how many pixels of the window the right classes, from its first pixel on, equal the left ones.
 #[inline(always)]
 fn agreement(block: &[[u8; LANES]; LANES], right: &[u8], stride: usize, window: usize) -> u32 {
     // No column has more than 31 pixels: bytes do not overflow.
@@ -202,8 +200,7 @@ mod tests {
     use super::*;
     use crate::math::random::CounterRng;
 
-    /// Cells of random levels, 8 px wide; the left view shows at `x` what the right shows at `x - d`, `e`
-    /// rows lower.
+    /// Random cells, 8 px wide; the left view shows at `x` what the right shows at `x - d`, `e` lower.
     fn view(d: i32, e: i32) -> Frame<f32> {
         let rng = CounterRng::new(3);
         Frame::from_fn(96, 80, |x, y| {

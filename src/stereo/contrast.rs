@@ -14,8 +14,7 @@ const EQUAL_CONTRAST: [f32; 2] = [0.92, 1.08];
 /// Largest ratio of the ratios; above, the views differ by more than a gain.
 const MAX_RATIO_SPREAD: f32 = 1.15;
 
-/// The right view times the ratio of contrasts, unless that is nearly 1 or undefined. Gradients depend on a
-/// gain, not on a bias.
+/// The right view times the ratio of contrasts, unless that is nearly 1 or undefined.
 pub(super) fn balanced<'a>(left: &Frame<f32>, right: &'a Frame<f32>) -> Cow<'a, Frame<f32>> {
     match ratio(left, right).filter(|_| crate::ablation::keeps("edges.contrast")) {
         Some(ratio) if !(EQUAL_CONTRAST[0]..=EQUAL_CONTRAST[1]).contains(&ratio) => {
@@ -25,8 +24,7 @@ pub(super) fn balanced<'a>(left: &Frame<f32>, right: &'a Frame<f32>) -> Cow<'a, 
     }
 }
 
-/// Ratio of the contrasts: median of the ratios of both views' upper quantiles. `None` if they differ, as
-/// with occlusion or saturation.
+/// Ratio of the contrasts: median of the ratios of both views' upper quantiles, if these agree.
 fn ratio(left: &Frame<f32>, right: &Frame<f32>) -> Option<f32> {
     let (left, right) = (greatest_differences(left)?, greatest_differences(right)?);
     let mut ratios: [f32; SHARES.len()] = std::array::from_fn(|i| left[i] / right[i]);

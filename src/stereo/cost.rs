@@ -77,8 +77,7 @@ fn rounded(value: f32) -> i16 {
     ((value + (SHIFT + 0.5)) as i32 - SHIFT as i32) as i16
 }
 
-/// The candidates of every edge pixel of one view: candidate `k` of the pixel in column `x` is column `x +
-/// first + k` of the other view.
+/// Candidate `k` of an edge pixel in column `x` is column `x + first + k` of the other view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Candidates {
     /// Where the first lies, px from the pixel.

@@ -22,14 +22,12 @@ pub struct EdgeDisparity {
     pub columns: Vec<u32>,
     /// Their disparities, px.
     pub values: Vec<f32>,
-    /// Agreement of the views, 0 to 1: share of the window's classed pixels whose class agrees, or 1 less the
-    /// matching cost over its truncation.
+    /// Agreement of the views, 0 to 1: share of pixels whose class agrees, or 1 less the relative cost.
     pub scores: Vec<f32>,
     /// Whether `row_offset` was searched and the views disagree with it: the true one lies outside of the
     /// range, or the views do not belong together. Many disparities are then wrong.
     pub rows_doubtful: bool,
-    /// Row offset of the right view: given, estimated, or the most frequent one of the class matching (0
-    /// without matches).
+    /// Row offset of the right view: given, estimated, or the most frequent one (0 without matches).
     pub row_offset: f64,
 }
 

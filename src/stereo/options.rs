@@ -67,8 +67,7 @@ pub struct EdgeDisparityOptions {
     pub prior: Option<Frame<f32>>,
     /// Search radius about the expected disparity, px; default 3.
     pub prior_radius: u32,
-    /// Standard deviation of the Gaussian behind gradients and edges, px; default 2, cut off at four times
-    /// that.
+    /// Standard deviation of the Gaussian of gradients and edges, px; default 2, cut off at four times.
     pub blur_sigma: f64,
     /// Least magnitude of the gradient that has a direction, grey levels/px; default 2.
     pub threshold: f64,

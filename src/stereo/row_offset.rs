@@ -39,8 +39,7 @@ const MIN_RESIDUAL_SCALE: f64 = 0.5;
 /// Floor of the sum of squared slopes of a window, (grey levels/px)^2.
 const MIN_SLOPE_SQUARES: f64 = 4.0;
 
-/// How many rows lower the right view shows a point: `y_right - y_left`, rows with fractions; 0 where nothing
-/// can be matched.
+/// How many rows lower the right view shows a point, `y_right - y_left`; 0 without matches.
 ///
 /// The most frequent row offset of the class matching (section 2.3) of some edge pixels within `row_range`,
 /// then twice: disparity by semi-global matching of the rows so aligned, and Lucas-Kanade steps along y in 9
@@ -147,8 +146,7 @@ struct Window {
     at: (f64, usize),
 }
 
-/// Contribution of one window: `sum g (L - R)` along x and y, and the root mean square of `L - R` less its
-/// mean.
+/// Contribution of one window: `sum g (L - R)` along x and y, and the rms of `L - R` less its mean.
 #[derive(Clone, Copy)]
 struct Misfit {
     moments: [f64; 2],
@@ -221,8 +219,7 @@ impl Window {
     }
 }
 
-/// The offset after at most so many Lucas-Kanade steps along y; none without enough windows, or when they
-/// leave the neighbourhood of the start.
+/// The offset after at most so many Lucas-Kanade steps along y; none if they fail or lead away.
 fn vertical_steps(windows: &mut [Window], right: &Frame<f32>, start: f64, steps: usize) -> Option<f64> {
     let mut offset = start;
     for _ in 0..steps {
@@ -238,8 +235,7 @@ fn vertical_steps(windows: &mut [Window], right: &Frame<f32>, start: f64, steps:
     Some(offset)
 }
 
-/// One step along y with the aligned right view, rows; the windows take their own along x with it. None
-/// without enough windows.
+/// One step along y, rows, with each window's own along x. None without enough windows.
 fn vertical_step(windows: &mut [Window], aligned: &Frame<f32>) -> Option<f64> {
     let misfits: Vec<Option<Misfit>> = windows.par_iter().map(|window| window.misfit(aligned)).collect();
     let mut residuals: Vec<f64> = misfits.iter().flatten().map(|misfit| misfit.residual).collect();

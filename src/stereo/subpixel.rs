@@ -23,16 +23,14 @@ const STEPS: usize = 5;
 const MAX_SHIFT: f32 = 1.0;
 /// Convergence tolerance, px.
 const MIN_STEP: f32 = 0.005;
-/// Whole pixels round the start at which the right window is looked at: enough for cubic convolution anywhere
-/// within [`MAX_SHIFT`].
+/// Whole pixels round the start: enough for cubic convolution anywhere within [`MAX_SHIFT`].
 const PLACES: usize = 6;
 /// Floor of `sum g^2` over the window, (grey levels/px)^2: noise.
 const MIN_SLOPE_SQUARES: f32 = 4.0;
 /// Edge pixels of one task.
 const TASK: usize = 256;
 
-/// Refines every match; one that does not come to rest within 1 px, or whose window is not inside both views,
-/// stays as it is.
+/// Refines every match; one that does not converge within 1 px inside both views stays as it is.
 pub(super) fn refine(left: &Frame<f32>, view: &View, right: &Frame<f32>, matches: &mut [Option<Match>]) {
     // The right view is smoothed as the slopes are, so that noise does not bias the steps.
     let smoother = GaussianSmoother { sigma: 1.0, truncate: 4.0, border: Border::Replicate };
@@ -109,8 +107,7 @@ impl Task<'_> {
         Some(at - from)
     }
 
-    /// The left slopes less their mean, their products with the left view summed, and their squares summed;
-    /// none where they are too flat.
+    /// The left slopes less their mean, sums of their products with the left view and of their squares.
     #[inline(always)]
     fn template(&self, x: usize, y: usize) -> Option<([[f32; ROW]; SIDE], f32, f32)> {
         let mut slopes = [[0.0f32; ROW]; SIDE];

@@ -5,8 +5,7 @@ use super::motion::AffineField;
 use super::texture::Noise;
 use crate::error::Result;
 
-/// Gaussian-filtered noise moving by `u(p) = (u, v) + M (p - c)`; the truth at a fixed pixel is the same at
-/// every time.
+/// Gaussian-filtered noise moving by `u(p) = (u, v) + M (p - c)`, the same at every time.
 pub type AffineTexture = Carried<Noise, AffineField>;
 
 impl AffineTexture {

@@ -12,8 +12,7 @@ const BLEND: f64 = 0.5;
 
 /// A textured disc turning at a constant angular velocity before a textured ground at rest.
 ///
-/// Inside, the truth is `u = -w (y - y_c)`, `v = w (x - x_c)`; outside it is zero; within `rim` px of the
-/// edge there is none.
+/// The truth is `u = -w (y - y_c)`, `v = w (x - x_c)` inside, zero outside, none within `rim` px.
 #[derive(Debug, Clone)]
 pub struct RotatingDisc<X> {
     /// `(width, height)` of a frame, px.

@@ -195,8 +195,7 @@ impl FlowFilterOptions {
     /// 1e-3, 1e-3, 1e-3)`, `R = 1e-3`, start at 0, with what the patent leaves open: `P0 = I`, `alpha = 1,
     /// beta = 2, kappa = 0`. Augmented, Runge-Kutta, 3x3.
     ///
-    /// Its process noise biases the divergence: on the patent's own scene `u_x` and `v_y` come out near +0.09
-    /// where the truth is 0.
+    /// Its process noise biases the divergence: on the patent's scene `u_x` and `v_y` are near +0.09, not 0.
     pub fn patent() -> Self {
         Self {
             neighbourhood: Neighbourhood::default(),

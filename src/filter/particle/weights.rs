@@ -24,11 +24,9 @@ pub fn linear_weights(log_weights: &[f64], out: &mut Vec<f64>) {
     out.extend(log_weights.iter().map(|value| value.exp()));
 }
 
-/// Effective sample size `(sum w)^2 / sum w^2` of linear weights, from 1 to their number; `1 / sum w^2` where
-/// they are normalised.
+/// Effective sample size `(sum w)^2 / sum w^2` of linear weights, from 1 to their number.
 ///
 /// Source: A. Kong, J. S. Liu, W. H. Wong, "Sequential imputations and Bayesian missing data problems", 1994.
-/// 0 if every weight is 0.
 pub fn effective_sample_size(weights: &[f64]) -> f64 {
     effective(weights.iter().copied())
 }

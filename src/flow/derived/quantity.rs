@@ -26,8 +26,7 @@ pub enum Quantity {
     AngularVelocity,
     /// Angular velocity in revolutions per minute; needs the frame period.
     Rpm,
-    /// x of the point that does not move, `p - M^-1 (u, v)` (WO2010/098160, 0104); it need not be in the
-    /// picture. px or units of the pitch.
+    /// x of the point that does not move, `p - M^-1 (u, v)` (WO2010/098160, 0104), px or pitch units.
     RotationCentreX,
     /// y of that point.
     RotationCentreY,

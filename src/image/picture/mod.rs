@@ -74,8 +74,7 @@ impl Picture {
         [self.data[at], self.data[at + 1], self.data[at + 2]]
     }
 
-    /// Mixes `colour` into the pixel at column `x`, row `y`: `coverage` 0 leaves it, 1 replaces it. Outside
-    /// the picture nothing happens.
+    /// Mixes `colour` into the pixel at column `x`, row `y`, if there is one, by `coverage`, 0 to 1.
     pub fn blend(&mut self, x: isize, y: isize, colour: Rgb, coverage: f64) {
         if x < 0 || y < 0 || x as usize >= self.width || y as usize >= self.height {
             return;

@@ -52,8 +52,7 @@ impl Quiver {
         })
     }
 
-    /// Draws `arrows` over `picture`. Unknown (NaN or infinite) flow is left out; flow shorter than half a
-    /// pixel on screen becomes a dot.
+    /// Draws `arrows` over `picture`: unknown flow is left out, the shortest becomes a dot.
     pub fn draw(&self, picture: &mut Picture, arrows: &[Arrow]) {
         let scale = self.resolve_scale(arrows);
         for pass in [(self.thickness + 1.6, [20, 20, 20]), (self.thickness, self.colour)] {

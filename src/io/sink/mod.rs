@@ -42,8 +42,7 @@ struct Kind {
 /// Every kind of sink; the first that accepts a specification opens it.
 const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, png::KIND];
 
-/// Opens a sink of grey frames by its specification: `-` (Y4M on standard output), `*.y4m`, `*.npy`, or a
-/// folder for numbered PNG files.
+/// Opens a sink of grey frames: `-` (Y4M on standard output), `*.y4m`, `*.npy`, or a folder for PNG.
 ///
 /// # Errors
 /// [`Error::Io`] when it cannot be made; [`Error::Argument`] named `frame_rate` unless that is positive, or

@@ -12,12 +12,10 @@ use crate::mixture::moments::Moments;
 const MIN_COUNT: f64 = 1e-3;
 /// Number of pairs that are tried before it ends.
 const TRIALS: usize = 3;
-/// Least gain of F, responsibilities held, with which a pair is tried: expectation-maximization may make up
-/// for the rest.
+/// Least gain of F, responsibilities held, with which a pair is tried.
 const MIN_GAIN: f64 = -20.0;
 
-/// Smallest responsibility that counts for entropy: quotients by smaller ones overflow, and their entropy is
-/// below rounding.
+/// Smallest responsibility that counts for entropy: quotients by smaller ones overflow.
 const MIN_SHARE: f64 = 1e-280;
 
 /// A pair of components.

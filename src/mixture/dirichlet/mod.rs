@@ -1,5 +1,4 @@
-//! Dirichlet-process mixtures of Gaussians for weighted points, by expectation-maximization with merging or
-//! by variational Bayes.
+//! Dirichlet-process mixtures of Gaussians for weighted points, by EM with merging or by VB.
 //!
 //! `v_k ~ Beta(1, alpha)`, `pi_k = v_k prod_(j<k) (1 - v_j)`, `(mu_k, Sigma_k) ~ NIW(m0, kappa0, nu0, Psi0)`,
 //! truncated at K components. T. Ferguson, "A Bayesian analysis of some nonparametric problems" (1973); D.

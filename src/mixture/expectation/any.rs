@@ -138,8 +138,7 @@ fn subtracted<V: Lanes<Scalar = f64>>(log: [V; ABREAST], z: [V; ABREAST]) -> [V;
     std::array::from_fn(|n| z[n].neg_mul_add(z[n], log[n]))
 }
 
-/// Responsibilities times weights times differences of a block, and the lanes' sums of the first and of the
-/// last.
+/// Responsibilities times weights times differences of a block, and the lanes' sums.
 #[inline(always)]
 fn weigh<V: Lanes<Scalar = f64>>(
     shares: &[f64],
@@ -167,8 +166,7 @@ fn weigh<V: Lanes<Scalar = f64>>(
     }
 }
 
-/// Adds the lower triangle of a block's weighted products to the lanes' sums, by tiles of two rows and two
-/// columns.
+/// Adds the lower triangle of a block's weighted products to the lanes' sums, by 2 x 2 tiles.
 #[inline(always)]
 fn add_products<V: Lanes<Scalar = f64>>(weighted: &[Plane], off: &[Plane], second: &mut [f64]) {
     for (upper, weighted) in weighted.chunks_exact(2).enumerate() {

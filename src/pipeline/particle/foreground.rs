@@ -25,8 +25,7 @@ impl ForegroundMaps {
         Ok(Self { album: Album::create(path.as_ref(), STEM, ARGUMENT, frame_rate)? })
     }
 
-    /// Refuses a folder that holds maps of an earlier run, which would end up as a mixture, and a sequence
-    /// that exists. Nothing is made.
+    /// Refuses a folder that holds maps of an earlier run, and a sequence that exists. Makes nothing.
     ///
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument) named `foreground`.

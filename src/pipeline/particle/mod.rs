@@ -1,5 +1,4 @@
-//! From colour frames to targets followed by particle filters: source, tracker, sinks; one frame at a time,
-//! in bounded memory.
+//! From colour frames to targets followed by particle filters: source, tracker, sinks.
 
 mod foreground;
 mod overlay;
@@ -46,8 +45,7 @@ pub trait ParticleSink: Send {
     /// Files that cannot be written; the run then ends.
     fn accept(&mut self, step: &ParticleFrame<'_>) -> Result<()>;
 
-    /// Called once at the end, however the run ended: brings what is complete under its final name and
-    /// removes the rest.
+    /// Called once at the end, however the run ended: names what is complete and removes the rest.
     ///
     /// # Errors
     /// Files that cannot be written.
@@ -57,8 +55,7 @@ pub trait ParticleSink: Send {
     fn files(&self) -> (usize, Option<PathBuf>);
 }
 
-/// Begins the sinks once the tracker has its first targets, so that no file is begun for those that cannot be
-/// followed.
+/// Begins the sinks once the tracker has its first targets.
 pub type BeginParticleSinks<'a> = Box<dyn FnOnce() -> Result<Vec<Box<dyn ParticleSink>>> + 'a>;
 
 /// A target and where it starts.

@@ -8,8 +8,7 @@ use crate::pipeline::track::{Row, RowWriter, TrackFormat};
 use crate::track::particle::ParticleTarget;
 use std::path::PathBuf;
 
-/// Writes a row for every target and frame, as [`TrackRows`](crate::pipeline::TrackRows). CSV has further
-/// columns:
+/// Writes rows as [`TrackRows`](crate::pipeline::TrackRows). CSV has further columns:
 ///
 /// | columns | unit |
 /// |---|---|

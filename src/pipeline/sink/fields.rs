@@ -21,8 +21,7 @@ pub struct Fields<T> {
 }
 
 impl<T: Real + Element> Fields<T> {
-    /// A writer for the formats of `plan`; `options` says (in JSON) how the fields were made, for formats
-    /// with room for it.
+    /// A writer for the formats of `plan`; `options` says (in JSON) how the fields were made.
     pub fn new(plan: OutputPlan, options: String) -> Self {
         Self { plan, options, waiting: None, written: 0, latest: None }
     }

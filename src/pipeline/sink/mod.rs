@@ -50,8 +50,7 @@ pub trait Sink<T>: Send {
     /// Files that cannot be written; the run then ends.
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()>;
 
-    /// Called once at the end, however the run ended: brings what is complete under its final name and
-    /// removes the rest.
+    /// Called once at the end, however the run ended: names what is complete and removes the rest.
     ///
     /// # Errors
     /// Files that cannot be written.
@@ -64,8 +63,7 @@ pub trait Sink<T>: Send {
 }
 
 impl OutputPlan {
-    /// The sinks of this plan, whose folder is made where there is none; `options` says (in JSON) how the
-    /// fields are made.
+    /// The sinks of this plan, whose folder is made; `options` says (in JSON) how the fields are made.
     ///
     /// # Errors
     /// [`Error::Io`] when the folder cannot be made or written.

@@ -13,8 +13,7 @@ use std::path::PathBuf;
 /// Pixels between arrows.
 const ARROW_SPACING: usize = 16;
 
-/// Ranges of the pictures of a run; `None`: from the first field with an estimate, then kept, so that the
-/// frames of a run can be compared.
+/// Ranges of the pictures of a run; `None`: from the first field with an estimate, then kept.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PictureRanges {
     /// Speed of the full colour, in the field's unit; also sets the arrows' scale.
@@ -86,8 +85,7 @@ impl Pictures {
         Ok(picture)
     }
 
-    /// A diverging map of a quantity. The first known field sets the range of the run: that of the wider one
-    /// of divergence and curl.
+    /// A diverging map of a quantity. The first known field sets the range, of divergence and curl.
     fn signed<T: Real>(&mut self, field: &FlowField<T>, quantity: Quantity) -> Result<Picture> {
         let values = plane(field, quantity)?;
         if self.ranges.rate.is_none() && is_known(&values) {

@@ -35,8 +35,7 @@ impl TableTarget {
     }
 }
 
-/// A table that ends as a run ends. On standard output its header comes with the first row: a run that fails
-/// before that leaves nothing there.
+/// A table that ends as a run ends. On standard output its header comes with the first row.
 #[derive(Debug)]
 pub struct Table {
     target: TableTarget,

@@ -1,5 +1,4 @@
-//! From pairs of views to tracks of everything that moves: views, preparation, grey levels, the stereo
-//! tracker, sinks; one pair at a time.
+//! From pairs of views to tracks: views, preparation, grey levels, the stereo tracker, sinks.
 
 mod graph;
 mod overlay;
@@ -31,8 +30,7 @@ const MIN_PAIRS: usize = 2;
 pub struct StereoStep<'a> {
     /// Index of the pair in the input.
     pub frame_index: usize,
-    /// Its time, s from the first frame of the input; `None` where neither the frame rate nor its time is
-    /// known.
+    /// Its time, s from the first frame of the input; `None` if not known.
     pub time: Option<f64>,
     /// The left view as it came.
     pub left: &'a AnyFrame,

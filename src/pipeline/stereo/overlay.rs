@@ -15,8 +15,7 @@ use std::path::{Path, PathBuf};
 pub enum StereoPicture {
     /// Edge pixels in the colours of their tracks, tracks' numbers, motions since the last step.
     Clusters,
-    /// Edge pixels in colours of their disparity, from blue at the first (far) to red at the second (near),
-    /// px.
+    /// Edge pixels coloured by disparity, from blue at the first (far) to red at the second (near), px.
     Disparities(f64, f64),
 }
 
@@ -84,8 +83,7 @@ impl StereoOverlays {
         Ok(Self { album, kind, enlargement, range: None })
     }
 
-    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a
-    /// sequence that exists. Nothing is made.
+    /// Refuses a folder that holds pictures of an earlier run, and a sequence that exists. Makes nothing.
     ///
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument) named `overlay` or `disparity_overlay`.

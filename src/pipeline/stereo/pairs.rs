@@ -17,8 +17,7 @@ pub struct GreyPair {
     pub grey: [Frame<f32>; 2],
 }
 
-/// Reads pairs ahead, on a thread of their own, and prepares them. The first views decide what the white of
-/// floats is, unless they are too dark to.
+/// Reads pairs ahead, on a thread of their own, and prepares them.
 pub struct GreyPairs {
     pairs: Prefetch<[AnyFrame; 2]>,
     total: usize,
@@ -42,8 +41,7 @@ impl GreyPairs {
         self.total
     }
 
-    /// The next pair, after `done` of them; `None` after the last. `progress` is called at least once, and
-    /// while there is none yet.
+    /// The next pair, after `done` of them; `None` after the last. Calls `progress` at least once.
     pub fn next(&mut self, done: usize, progress: &dyn Progress) -> Result<Option<GreyPair>> {
         progress.step(done, self.total)?;
         let Some(views) = self.pairs.next(|| progress.step(done, self.total))? else { return Ok(None) };

@@ -14,8 +14,7 @@ pub struct PairTimes {
 }
 
 impl PairTimes {
-    /// From the times of all pairs of the input, s; `numbering` says which of them are used. An ordinary step
-    /// is the median of theirs.
+    /// From the times of all pairs of the input, s, those of `numbering`; the ordinary step is the median.
     ///
     /// # Errors
     /// [`Error::Argument`] named `times` for fewer than two that are used, and for those that do not ascend.

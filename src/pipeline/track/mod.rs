@@ -1,5 +1,4 @@
-//! From a frame source to tracks: source, preparation, grey levels, trackers, sinks; one frame at a time, in
-//! bounded memory.
+//! From frames to tracks: source, preparation, grey levels, trackers, sinks, one frame at a time.
 
 mod overlay;
 mod rows;
@@ -42,8 +41,7 @@ pub trait TrackSink: Send {
     /// Files that cannot be written; the run then ends.
     fn accept(&mut self, step: &TrackStep<'_>) -> Result<()>;
 
-    /// Called once at the end, however the run ended: brings what is complete under its final name and
-    /// removes the rest.
+    /// Called once at the end, however the run ended: names what is complete and removes the rest.
     ///
     /// # Errors
     /// Files that cannot be written.
@@ -53,8 +51,7 @@ pub trait TrackSink: Send {
     fn files(&self) -> (usize, Option<PathBuf>);
 }
 
-/// What a run begins with. Sinks come with the trackers, so that no file is begun for targets that cannot be
-/// followed.
+/// What a run begins with: no file is begun for targets that cannot be followed.
 pub struct Begun {
     /// One tracker a target.
     pub trackers: Vec<Box<dyn Tracker>>,

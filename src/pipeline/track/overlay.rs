@@ -14,8 +14,7 @@ pub const PATH_LENGTH: usize = 1000;
 /// First word of the files' names.
 const STEM: &str = "track";
 
-/// Writes every frame with its targets as `track_000012.png`, numbered as in the input, each whole, or as one
-/// sequence.
+/// Writes every frame with its targets as `track_000012.png`, numbered as in the input, or a sequence.
 #[derive(Debug)]
 pub struct Overlays {
     album: Album,
@@ -32,8 +31,7 @@ impl Overlays {
         Ok(Self { album, overlay, range: None, paths: Vec::new() })
     }
 
-    /// Refuses a folder that holds pictures of an earlier run, which would end up as a mixture, and a
-    /// sequence that exists. Nothing is made.
+    /// Refuses a folder that holds pictures of an earlier run, and a sequence that exists. Makes nothing.
     ///
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument) named `overlay`.

@@ -32,8 +32,7 @@ pub struct Turbulence {
 }
 
 impl Turbulence {
-    /// A field whose root-mean-square speed `sqrt(mean(u^2 + v^2))` over space is `speed` px/frame and whose
-    /// longest wave is `longest` px.
+    /// A field whose root-mean-square speed is `speed` px/frame and whose longest wave is `longest` px.
     pub fn new(speed: f64, longest: f64, seed: u64) -> Self {
         let rng = CounterRng::new(seed);
         let mut waves: Vec<Wave> = (0..WAVES)

@@ -35,8 +35,7 @@ pub struct Waves {
 }
 
 impl Waves {
-    /// A field whose root-mean-square speed `sqrt(mean(u^2 + v^2))` over space is `speed` px/frame and whose
-    /// waves are about `wavelength` px long.
+    /// A field whose root-mean-square speed is `speed` px/frame and whose waves are `wavelength` px long.
     pub fn new(speed: f64, wavelength: f64, seed: u64) -> Self {
         let rng = CounterRng::new(seed);
         let share = |place: usize, draw: u64| TAU * (place as f64 + rng.uniform(draw)) / WAVES as f64;

@@ -5,8 +5,7 @@
 //! differences are the variances of the motion handed down from that level. They are taken from mean absolute
 //! values, as for Gaussian errors, so that a few nodes at motion boundaries do not dominate.
 //!
-//! The windows of refinement carry such errors a little way out of those areas, and where the errors grow,
-//! the slopes err by the rise.
+//! Refinement windows carry such errors out of those areas; where errors grow, slopes err by the rise.
 
 use super::binomial_mean;
 use super::constrained_directions::ConstrainedDirections;

@@ -32,8 +32,7 @@ impl DataSupport {
         Self::with(data, size, |_, _| true)
     }
 
-    /// The same, counting only sites whose nearest node has texture (`textured`, row by row): elsewhere
-    /// motion is extrapolated as well.
+    /// The same, counting only sites whose nearest node has texture (`textured`, row by row).
     pub fn textured<T: SimdReal>(data: &Planes<T>, size: (usize, usize), textured: &[bool]) -> Self {
         let nearest = |site: usize, count: usize| ((site + SITES_PER_NODE / 2) / SITES_PER_NODE).min(count - 1);
         Self::with(data, size, |x, y| textured[nearest(y, size.1) * size.0 + nearest(x, size.0)])
@@ -59,8 +58,7 @@ impl DataSupport {
         Self { distances: distances.collect(), along, across, width }
     }
 
-    /// Distances of a node along x and along y, px: to the outermost usable site of its run, or, negative,
-    /// back to the nearest usable one.
+    /// Distances of a node along x and y, px: to the end of its usable run, or, negative, back to one.
     pub fn distances(&self, x: usize, y: usize) -> [f64; 2] {
         self.distances[y * self.width + x]
     }
@@ -90,8 +88,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// For `sites[1]` lines of `sites[0]` sites, the same of nodes, and whether the site at a position on a
-    /// line is usable.
+    /// For `sites[1]` lines of `sites[0]` sites, the same of nodes; whether the site on a line is usable.
     fn new(sites: [usize; 2], nodes: [usize; 2], is_usable: impl Fn(usize, usize) -> bool) -> Self {
         let any: Vec<bool> = (0..sites[1]).map(|line| (0..sites[0]).any(|at| is_usable(at, line))).collect();
         let (mut distances, mut own, mut ends) = (Vec::with_capacity(nodes[0] * nodes[1]), Vec::new(), Vec::new());

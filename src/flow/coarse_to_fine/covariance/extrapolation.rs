@@ -16,8 +16,7 @@ use std::f64::consts::FRAC_PI_2;
 /// Measured distances, nodes; each twice the one before.
 const STEPS: [usize; 4] = [1, 2, 4, 8];
 
-/// Shift, in standard deviations, of one-sided windows at the edge: their motion is that further in,
-/// extrapolated.
+/// Shift, in standard deviations, of one-sided windows at the edge: their motion is that further in.
 const EDGE_SHIFT: f64 = 0.5;
 /// Maximum sigma of such a window, px: wider ones are chosen only where nothing is curved.
 const MAX_EDGE_SIGMA: f64 = 8.0;

@@ -48,8 +48,7 @@ pub(in crate::flow::coarse_to_fine) struct CovarianceMap<T> {
 }
 
 impl<T: SimdReal> CovarianceMap<T> {
-    /// From nodes, row by row, of the given level of the pyramid: flow is scaled to pixels of the frame,
-    /// slopes are the same.
+    /// From nodes, row by row, of the given level of the pyramid: flow is scaled to pixels of the frame.
     pub(super) fn new(nodes: &[Entries], (along, across): (NodeAxis, NodeAxis), level: usize) -> Self {
         let factor = f64::from(1 << level as u32);
         let mut scale = [0.0; ENTRIES];

@@ -1,5 +1,4 @@
-//! Covariance of the refined motion `(u, v, u_x, v_x, u_y, v_y)`, at nodes every eighth pixel and linear
-//! between.
+//! Covariance of the refined motion `(u, v, u_x, v_x, u_y, v_y)`, at nodes every eighth pixel.
 //!
 //! Errors of several kinds add, each measured in the frames themselves:
 //!
@@ -65,8 +64,7 @@ const CHANGE_NOISE_FACTOR: f64 = 0.55;
 const ACCELERATION_SHARE: f64 = 0.015;
 /// Minimum share of textured nodes from which the field's own variation is measured.
 const MIN_TEXTURED_SHARE: f64 = 0.02;
-/// Share of the noise variance that the next frames' estimates repeat: the texture, and its part of the
-/// errors, moves on slowly.
+/// Share of the noise variance that the next frames' estimates repeat: texture moves on slowly.
 const REPEATED_NOISE_SHARE: f64 = 0.3;
 
 /// A covariance: its upper triangle, row by row.
@@ -154,14 +152,12 @@ fn textured_support<T: SimdReal>(noise: &Noise<'_, T>, data: &Planes<T>, size: (
     tells.then(|| DataSupport::textured(data, size, &textured))
 }
 
-/// Adds the noise density times its share in the flow and in the derivatives along x and y; `factors` for the
-/// flow and for the slopes.
+/// Adds the noise density times its share in flow and derivatives; `factors` for flow and slopes.
 fn add_noise(node: &mut Entries, noise: &RemainingNoise, [flow, slopes]: [f64; 2]) {
     add_blocks(node, [flow * noise.flow, slopes * noise.slopes[0], slopes * noise.slopes[1]], &noise.density);
 }
 
-/// Adds a symmetric matrix `xx, xy, yy` times a factor to the blocks of the flow and of its derivatives along
-/// x and y.
+/// Adds a symmetric matrix `xx, xy, yy` times a factor to the blocks of the flow and its derivatives.
 fn add_blocks(node: &mut Entries, factors: [f64; 3], matrix: &[f64; 3]) {
     for (block, factor) in factors.into_iter().enumerate() {
         for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
@@ -206,8 +202,7 @@ fn add_locking(node: &mut Entries, motion: &[f64; 6], locking: &PeakLocking) {
     }
 }
 
-/// Adds the effect of curved paths, `M (u, v)` in steady flow, on three frames, whose outer ones are warped
-/// by equal steps.
+/// Adds the effect of curved paths, `M (u, v)` in steady flow, on three frames (equal steps).
 fn add_acceleration(node: &mut Entries, &[u, v, u_x, v_x, u_y, v_y]: &[f64; 6]) {
     node[upper(0, 0)] += (ACCELERATION_SHARE * (u_x * u + u_y * v)).powi(2);
     node[upper(1, 1)] += (ACCELERATION_SHARE * (v_x * u + v_y * v)).powi(2);

@@ -35,8 +35,7 @@ const EXCESS_BOUNDS: [f64; 2] = [0.5, 50.0];
 const PAIR_NOISE_INFORMATION: f64 = 52.25 / 8.25 * 0.25 * FITTED_NOISE_FACTOR;
 const TRIPLE_NOISE_INFORMATION: f64 = 52.25 / 8.25 * 0.75 * FITTED_NOISE_FACTOR;
 const FITTED_NOISE_FACTOR: f64 = 1.5;
-/// Width of a strip without data, px, that doubles the variance at its edge of the frame: of means and of
-/// slopes.
+/// Width of a strip without data, px, that doubles the variance at the edge: of means and of slopes.
 const STRIP_UNIT: [f64; 2] = [3.5, 4.0];
 /// Maximum width of such a strip, px; the extrapolation error covers wider ones.
 const MAX_STRIP: f64 = 16.0;
@@ -91,8 +90,7 @@ fn of_white_noise(power: i32) -> f64 {
     terms().flat_map(|(c, m)| terms().map(move |(d, n)| c * d * (2.0 / f64::from(m + n)).powi(power))).sum()
 }
 
-/// Remaining noise at a node: the density matrix `D_uu, D_uv, D_vv`, px^4, and its shares in the flow and in
-/// the derivatives along x and y.
+/// Remaining noise at a node: the density matrix `D_uu, D_uv, D_vv`, px^4, and its shares.
 pub(super) struct RemainingNoise {
     pub density: [f64; 3],
     pub flow: f64,
@@ -102,8 +100,7 @@ pub(super) struct RemainingNoise {
 /// Variance of a vanished field, as a share of the noise in the widest window.
 const VANISHED_NOISE_SHARE: f64 = 0.5;
 
-/// Factors of the noise at an edge of the frame: of means and of slopes along the edge, and of slopes across
-/// it.
+/// Factors of the noise at an edge: of means and slopes along the edge, and of slopes across it.
 fn at_edge(edge: &Edge, sigma: f64) -> [f64; 2] {
     let t = edge.distance / sigma;
     if t > MAX_EDGE_DISTANCE {
@@ -140,8 +137,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         }
     }
 
-    /// With at least the excess of `other`, from the same frames: where nearly no window is accepted, the
-    /// excess is poorly measured.
+    /// With at least the excess of `other`: it is poorly measured where nearly no window is accepted.
     pub fn at_least_as_noisy_as(self, other: &Self) -> Self {
         Self { excess: self.excess.max(other.excess), ..self }
     }
@@ -154,8 +150,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         }
     }
 
-    /// Whether there is texture within [`TEXTURE_REACH`] sites of a node, so that motion in every direction
-    /// is determined there.
+    /// Whether there is texture within [`TEXTURE_REACH`] sites of a node.
     pub fn is_textured(&self, data: &Planes<T>, x: usize, y: usize) -> bool {
         let around = |node: usize, len: usize| {
             let middle = (SITES_PER_NODE * node).min(len - 1);

@@ -21,8 +21,7 @@ pub(super) fn dense_row<V: Lanes>(
     }
 }
 
-/// Component `c` and its slope along x where row `y` of pixels crosses the columns of sites, and one site
-/// beyond the last.
+/// Component `c` and its slope along x on row `y` of pixels at the sites, and one site beyond the last.
 #[inline(always)]
 fn site_row<V: Lanes>(
     motion: &Planes<V::Scalar>,

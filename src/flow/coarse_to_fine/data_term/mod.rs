@@ -40,8 +40,7 @@ use rayon::prelude::*;
 use scratch::Scratch;
 use std::sync::{Mutex, PoisonError};
 
-/// Maximum site rows of a band: its halo costs a sixth of 32 rows and a tenth of 48; larger bands would leave
-/// threads idle.
+/// Maximum site rows of a band: its halo costs a tenth of 48 rows; larger ones leave threads idle.
 const BAND: usize = 48;
 
 /// Rows of each band: equal, and an even number of bands. The split depends on the size alone.
@@ -130,8 +129,7 @@ impl<'a, T: SimdReal> DataTerm<'a, T> {
         Self { level, options, taps: taps(options.sigma), pool }
     }
 
-    /// Writes the [`COUNT`] planes of moments of a level of `size` pixels to `out`; returns `|R|` at every
-    /// fourth usable pixel of every fourth row.
+    /// Writes the [`COUNT`] planes of moments of a level to `out`; returns `|R|` of a subsample.
     ///
     /// `motion` holds the [`MOTION`] planes on the sites, finite, in px of this level per frame. `scale` is
     /// the standard deviation of `R` where brightness is constant; without it every usable pixel has the

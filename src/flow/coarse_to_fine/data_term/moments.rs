@@ -21,8 +21,7 @@ use crate::simd::{Lanes, SimdReal};
 
 /// Number of planes.
 pub(in super::super) const COUNT: usize = 26;
-/// First plane of the right sides; before it lie six moments (1, x, y, x^2, xy, y^2) each of `P_uu`, `P_uv`
-/// and `P_vv`.
+/// First plane of the right sides, after moments (1, x, y, x^2, xy, y^2) of `P_uu`, `P_uv`, `P_vv`.
 const RIGHT: usize = 18;
 /// Plane of the window's mean of `e`.
 pub(in super::super) const ERROR: usize = 24;
@@ -64,8 +63,7 @@ pub(in super::super) fn summary<T: SimdReal>(space: &PlanePool<T>, data: &Planes
     out
 }
 
-/// The filters of one axis at distance 0, 1, ...: `[g, g k, g k^2]` of the Gaussian of `sigma` px, its full
-/// sum 1.
+/// The filters of one axis at distance 0, 1, ...: `[g, g k, g k^2]` of the Gaussian of `sigma` px.
 pub(super) fn taps<T: SimdReal>(sigma: f64) -> Vec<[T; 3]> {
     // The margins of the rows do not hold a wider window.
     let radius = ((3.0 * sigma + 0.5) as usize).min(2 * LEFT - 2);
@@ -74,8 +72,7 @@ pub(super) fn taps<T: SimdReal>(sigma: f64) -> Vec<[T; 3]> {
     raw.iter().enumerate().map(|(k, g)| [0, 1, 2].map(|p| T::from_f64(g / sum * (k as f64).powi(p)))).collect()
 }
 
-/// Filters down the columns: `source(-r ..= r)` are the rows of one plane, `out` are `N` planes: with `g`, `y
-/// g`, `y^2 g`.
+/// Filters down the columns: `source(-r ..= r)` are rows of a plane, `out` planes by `g`, `y g`, `y^2 g`.
 #[inline(always)]
 pub(super) fn vertical<V: Lanes, const N: usize>(
     columns: &Columns,

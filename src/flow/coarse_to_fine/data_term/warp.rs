@@ -8,8 +8,7 @@ use crate::types::Mask;
 /// Maximum number of lanes of a vector.
 const MAX_LANES: usize = 16;
 
-/// Mean and rate of the views in row `y` of a level of `width x height` pixels, and 1 where every view is
-/// usable and inside the border.
+/// Mean and rate of the views in row `y` of a level, and 1 where every view is usable.
 ///
 /// `frame` as in the scratch; `image` is a row of the planes `A, R, u, v`, validity, of which `u` and `v` are
 /// given.

@@ -20,8 +20,7 @@ const MIN_NOISE_SHARE: f64 = 1e-3;
 const MIN_MOVING_DISTANCE: f64 = 0.1;
 /// Number of such sites that may be an object too small to change the mean over the frame.
 const MIN_OBJECT_SITES: usize = 4;
-/// Minimum and maximum width, sites, of a border that is not counted: motion out of the frame may drift
-/// without end.
+/// Minimum and maximum width, sites, of a border that is not counted: there motion may drift.
 const BORDER_SITES: (usize, usize) = (2, 4);
 /// The border is this fraction of the sites, within those bounds.
 const BORDER_DIVISOR: usize = 16;
@@ -30,8 +29,7 @@ const BORDER_DIVISOR: usize = 16;
 /// object before a static ground is held back by the usual smoothness, which the ground needs.
 const TRIAL: (usize, Smoothness) =
     (3, Smoothness { flow: 1.0, jacobian: 100.0, break_strain: 0.1, sweeps: 4, reweight_every: 2 });
-/// Minimum distance, px of the level, of the trial's motion from the regularised one; nearer, it is the same
-/// motion with more noise.
+/// Minimum distance, px of the level, of the trial's motion from the regularised one.
 const MIN_MOTION_DIFFERENCE: f64 = 0.5;
 /// Minimum change in the first iteration of the trial, px of the level: else no site leaves its motion.
 const MIN_TRIAL_CHANGE: f64 = 0.25;
@@ -75,8 +73,7 @@ impl<T: SimdReal> Iteration<'_, T> {
         }
     }
 
-    /// Unregularised trial: estimates sites without their neighbours and keeps what explains the frames
-    /// better, so that small objects are found.
+    /// Unregularised trial: estimates sites without their neighbours, so that small objects are found.
     pub fn try_unregularized(
         &mut self,
         level: &PyramidLevel<T>,

@@ -16,8 +16,7 @@ pub(super) const FIT: usize = 7;
 /// Minimum misfit, px^2: below it, rounding.
 pub(super) const MIN_MISFIT: f64 = 1e-6;
 
-/// The six values of the fit to planes 0 and 1 of `from` along row `y`, each in a line of `out`; `down` holds
-/// four lines.
+/// The six values of the fit to planes 0 and 1 of `from` along row `y`, to `out`; `down`: four lines.
 #[inline(always)]
 pub(super) fn fit_row<V: Lanes>(
     from: &Field<V::Scalar>,

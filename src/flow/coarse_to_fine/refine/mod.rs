@@ -52,8 +52,7 @@ pub(super) use window_statistics::{SITES_PER_NODE, WindowStatistics, node_count}
 #[cfg(test)]
 pub(super) const SIGMA: usize = 6;
 
-/// Refines `motion` (u, v, u_x, v_x, u_y, v_y on sites [`SITE_SPACING`] px apart; the slopes are not used),
-/// given the summary of the last data term.
+/// Refines the flow of `motion`, given the summary of the last data term.
 ///
 /// Returns eight planes: the motion, the mean sigma, the noise density of the given flow (its variance times
 /// the area over which the noise is independent); and the statistics of the choice, `None` without sites.

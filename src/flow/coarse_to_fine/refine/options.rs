@@ -35,14 +35,12 @@ pub(in crate::flow::coarse_to_fine) struct RefineOptions {
     pub edge_misfit: f64,
     /// Relative misfit at which slopes are half those of wider edge fits.
     pub step_misfit: f64,
-    /// Whether the field may be affine over the whole frame: zero is then one more choice beyond the widest
-    /// window.
+    /// Whether the field may be affine over the whole frame: one more choice beyond the widest window.
     pub may_vanish: bool,
 }
 
 impl RefineOptions {
-    /// For motion that a finer level starts from: that level's few iterations remove noise, but do not
-    /// restore what a window has smoothed away.
+    /// For motion that a finer level starts from, which cannot restore what a window has smoothed away.
     pub fn intermediate() -> Self {
         let Self { ladder, kappa, .. } = Self::default();
         Self {

@@ -1,7 +1,6 @@
 //! Robust regional means: typical values around a site, insensitive to a few outliers.
 //!
-//! The mean is a power mean `(G * f^p)^(1/p)`: with p = 1/4 near a median, with p = -1/4 near the calm part
-//! of the region.
+//! The mean is a power mean `(G * f^p)^(1/p)`: p = 1/4 is near a median, p = -1/4 near the calm part.
 
 use super::RefineOptions;
 use super::extended::{Continuation, Field, RIM};

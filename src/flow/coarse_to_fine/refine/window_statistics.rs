@@ -36,8 +36,7 @@ impl<T: SimdReal> WindowStatistics<T> {
         [self.means, self.choice]
     }
 
-    /// Nodes along x and y, [`SITES_PER_NODE`] sites apart; the last ones are at the last
-    /// sites and may be nearer.
+    /// Nodes along x and y, [`SITES_PER_NODE`] sites apart; the last ones may be nearer.
     pub fn size(&self) -> (usize, usize) {
         (node_count(self.sites.0), node_count(self.sites.1))
     }

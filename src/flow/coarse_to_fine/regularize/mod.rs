@@ -11,8 +11,7 @@
 //! |du|^2 + jacobian |dJ|^2) / break_strain)` (iteratively reweighted least squares with Cauchy's weights),
 //! so that two motions may meet at an edge. Sites without data take the motion of their neighbours.
 //!
-//! [`smoothness`] has the weights, [`solve`] the 6x6 equations, [`relaxation`] the visit to a row,
-//! [`wavefront`] the order of the visits.
+//! Weights: [`smoothness`]; equations: [`solve`]; a row: [`relaxation`]; order: [`wavefront`].
 
 mod relaxation;
 mod smoothness;

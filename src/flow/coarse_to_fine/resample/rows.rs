@@ -33,8 +33,7 @@ impl<T: SimdReal> RowReader<T> {
         let quarter = T::from_f64(0.25);
         let n = motion.width;
         if y % 2 == 1 {
-            // Contribution of the slopes along y: a quarter of their difference between rows; beyond the last
-            // row, the whole slope.
+            // The slopes along y: a quarter of their difference; beyond the last row, the whole slope.
             let (above, below) = (y / 2, y / 2 + 1);
             for c in 0..2 {
                 let (first, flow) = (motion.line(4 + c, above), &mut self.sites[c * n..(c + 1) * n]);
