@@ -39,14 +39,8 @@ pub(super) fn locate(state: &State, frame: &Frame<f64>) -> Option<Finding> {
     }
     let interrupted = state.history.occluded || state.history.missed > 0;
     let levels = if state.history.age > 0 && state.history.missed == 0 { &LEVELS[1..] } else { &LEVELS[..] };
-    // A target that comes out of cover has the size that it had: the part that is seen would fit a smaller one.
-    let returns = state.history.missed > 0 || state.history.reappearing > 0;
-    let motion_model = if returns && crate::ablation::keeps("gradient.returning_size") {
-        MotionModel::Translation
-    } else {
-        state.motion_model
-    };
-    let plain = try_at(state, frame, &state.expected(), (motion_model, VoteMask::None, PRIOR, levels));
+    let plain = try_at(state, frame, &state.expected(), (state.motion_model, VoteMask::None, PRIOR, levels));
+    let plain = locate_returning(state, frame, plain.as_ref(), levels).or(plain);
     let plain = locate_displaced(state, frame, plain.as_ref()).or(plain);
     let mut best = plain;
     let doubted = crate::ablation::keeps("gradient.occlusion")
@@ -93,8 +87,18 @@ pub(super) fn locate(state: &State, frame: &Frame<f64>) -> Option<Finding> {
     })
 }
 
-/// The target where the changes since the first frame say that it is, if it was found elsewhere: its speed is
-/// not known yet, and gradient steps from rest may lead to the wrong side of a rough background.
+/// A target that comes out of cover smaller than it went in: the part that is seen would fit a smaller one,
+/// and the size is held.
+fn locate_returning(state: &State, frame: &Frame<f64>, plain: Option<&Finding>, levels: &[f64]) -> Option<Finding> {
+    let returns = state.history.missed > 0 || state.history.reappearing > 0;
+    if !returns || !state.has_shrunk(&plain?.aligned.pose) || !crate::ablation::keeps("gradient.returning_size") {
+        return None;
+    }
+    try_at(state, frame, &state.expected(), (MotionModel::Translation, VoteMask::None, PRIOR, levels))
+}
+
+/// The target where the changes since the first frame say that it is, if it was found elsewhere: its speed
+/// is not known yet, and gradient steps from rest may lead to the wrong side of a rough background.
 fn locate_displaced(state: &State, frame: &Frame<f64>, plain: Option<&Finding>) -> Option<Finding> {
     let initial = state.initial.as_ref().filter(|_| crate::ablation::keeps("gradient.start_drift"))?;
     let (first, moved) = (initial.bounds.centre(), initial.moved()?);

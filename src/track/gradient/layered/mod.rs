@@ -7,7 +7,7 @@
 //! 1. `scene`: is the frame usable, in which `light`, and how did the `camera` move (`samples`, `nearby`)?
 //!    The background is shifted with it (`background_shift`).
 //! 2. `restart`: in the first frames, the initial segmentation: does the box hold an `occluder`, or another
-//!    box than that of what moves (`refit`, `outgrown`)?
+//!    box than that of what moves (`refit`)?
 //! 3. `locate`: the target, by alignment (`task`, `level`, `alignment`) and a `score` (`finding`), with
 //!    `occlusion`, a `search` all around, a changed outline (`reshaped`) or size (`resized`).
 //! 4. `apply`: the measurement goes to the filter, and the layers `learn` from the frame. A target that
@@ -30,7 +30,6 @@ mod nearby;
 mod occluder;
 mod occlusion;
 mod oriented_box;
-mod outgrown;
 mod patch;
 mod pose;
 mod refit;

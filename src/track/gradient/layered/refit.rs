@@ -1,4 +1,4 @@
-//! A first box that is too large, too wide or beside the target: what moves has another outline.
+//! A first box that is too large, too small or beside the target: what moves has another outline.
 //!
 //! In the first frames that move, what moves is looked for without the box ([`detect_moving_target`]). Where
 //! it has clearly other sides than the box, what else the box holds stayed where it was and does not look
@@ -25,7 +25,7 @@ const MAX_BEYOND_BOX: f64 = 1.5;
 /// Angle, rad, from which on changes since the first frame no longer determine the outline.
 pub(super) const TURNED: f64 = 0.05;
 /// Sides of what moves over those of the box, at least and at most.
-const SIDES: [f64; 2] = [0.55, 1.6];
+const SIDES: [f64; 2] = [0.55, 2.5];
 /// Distance of the middles of the two, share of the box's sides.
 const MAX_CENTER_OFFSET: f64 = 0.4;
 /// The same, and px, where the box holds all of what moves: of a target that an object hides in part the box

@@ -25,16 +25,13 @@ pub(super) fn resolve_initial(state: &mut State, frame: &Frame<f64>, motion: [f6
     let Some(mut outset) = state.initial.take().filter(|_| motion == [0.0; 2]) else { return };
     match find_occluder(&mut outset, frame, state.scene.noise) {
         Some(found) => restart_occluded(state, &outset, &found, frame),
-        None => match outset
-            .outgrown(frame, state.scene.noise)
-            .filter(|_| crate::ablation::keeps("gradient.start_outgrown"))
-            .or_else(|| {
-                box_of_motion(state, &outset, frame).filter(|_| crate::ablation::keeps("gradient.start_refitted"))
-            }) {
-            Some(found) => restart_with_box(state, &found, frame, outset.frames()),
-            None if outset.is_over() => {}
-            None => state.initial = Some(outset),
-        },
+        None => {
+            match box_of_motion(state, &outset, frame).filter(|_| crate::ablation::keeps("gradient.start_refitted")) {
+                Some(found) => restart_with_box(state, &found, frame, outset.frames()),
+                None if outset.is_over() => {}
+                None => state.initial = Some(outset),
+            }
+        }
     }
 }
 
