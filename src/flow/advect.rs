@@ -189,6 +189,3 @@ fn cell(place: f64, count: usize) -> Option<(usize, f64)> {
     let first = (place.floor() as usize).min(count.saturating_sub(2));
     Some((first, place - first as f64))
 }
-
-#[cfg(test)]
-mod tests;

@@ -66,17 +66,3 @@ impl Status {
         matches!(self, Self::Ok | Self::Repaired | Self::Predicted | Self::Inconsistent)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn codes_round_trip() {
-        for (code, status) in Status::ALL.into_iter().enumerate() {
-            assert_eq!(status as usize, code);
-            assert_eq!(Status::from_code(code as u8), Some(status));
-        }
-        assert_eq!(Status::from_code(200), None);
-    }
-}

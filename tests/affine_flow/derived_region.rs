@@ -50,8 +50,7 @@ fn a_region_has_one_value() {
     let mean = region_mean(&overlapping, Quantity::Divergence, region, Aggregate::InverseVariance).unwrap();
     assert!((mean.std - 0.1).abs() < 1e-6);
     // Claimed errors far below the scatter are not believed.
-    let tight =
-        region_mean(&field(Some(1e-6), None), Quantity::Divergence, None, Aggregate::InverseVariance).unwrap();
+    let tight = region_mean(&field(Some(1e-6), None), Quantity::Divergence, None, Aggregate::InverseVariance).unwrap();
     assert!((tight.value - 0.35).abs() < 1e-9 && tight.std > 0.05);
     let mean = parameter_mean(&f, "u_x", region, Aggregate::InverseVariance).unwrap();
     assert!((mean.value - 0.2).abs() < 1e-12 && (mean.std - 0.1 / 3f64.sqrt()).abs() < 1e-12);

@@ -4,7 +4,6 @@ mod pieces;
 
 use super::*;
 use crate::flow::coarse_to_fine::data_term::{ENERGY, SEEN, SUMMARY, UU, VV};
-use crate::parallel::Threads;
 use std::f64::consts::PI;
 
 /// Evenly distributed between -1 and 1, the same for the same number.
@@ -170,16 +169,6 @@ fn busy<T: SimdReal>() -> Planes<T> {
     field(83, 70, |k, x, y| {
         (x / 31.0 + k as f64).sin() + if x > y { 3.0 } else { 0.0 } + 0.05 * noise((x * 777.0 + y) as usize)
     })
-}
-
-#[test]
-fn the_number_of_threads_changes_no_bit() {
-    let (motion, data) = (busy::<f32>(), statistics(83, 70, density(0.03)));
-    let run = |threads: usize| Threads::new(Some(threads)).unwrap().install(|| refined(&motion, &data));
-    let (one, two) = (run(1), run(2));
-    for (k, y) in (0..8).flat_map(|k| (0..70).map(move |y| (k, y))) {
-        assert!(two.line(k, y).iter().zip(one.line(k, y)).all(|(a, b)| a.to_bits() == b.to_bits()), "{k} {y}");
-    }
 }
 
 #[test]

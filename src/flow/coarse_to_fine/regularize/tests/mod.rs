@@ -1,7 +1,6 @@
 mod reference;
 
 use super::*;
-use crate::parallel::Threads;
 use reference::{affine, energy, filled, made, motion_at, naive, rough};
 
 const ROBUST: Smoothness = Smoothness { flow: 20.0, jacobian: 2000.0, break_strain: 0.1, sweeps: 6, reweight_every: 2 };
@@ -165,20 +164,4 @@ fn flow_changes_by_no_more_than_its_limit() {
     let lengths = (0..33 * 17).map(|i| motion.at(0, i % 33, i / 33).hypot(motion.at(1, i % 33, i / 33)));
     let (least, most) = lengths.fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), x| (a.min(x), b.max(x)));
     assert!(most < MAX_FLOW_CHANGE + 1e-12 && least > 0.99 * MAX_FLOW_CHANGE, "{least} to {most}");
-}
-
-#[test]
-fn threads_do_not_change_a_bit() {
-    let data = made::<f32>(70, 100, |x, y| ((x * 7 + y * 3) % 5 != 0).then(|| rough(x, y)));
-    for c in [ROBUST, Smoothness { sweeps: 1, ..ROBUST }, Smoothness { sweeps: 9, ..ROBUST }] {
-        let of = |threads: usize| {
-            let mut motion = filled::<f32>(70, 100, rough);
-            Threads::new(Some(threads)).unwrap().install(|| run(Level::detect(), &data, &mut motion, &c));
-            (0..100)
-                .flat_map(|y| (0..6).flat_map(|k| motion.line(k, y).to_vec()).collect::<Vec<_>>())
-                .collect::<Vec<_>>()
-        };
-        let one = of(1);
-        assert!([2, 3, 4].iter().all(|&threads| of(threads) == one));
-    }
 }

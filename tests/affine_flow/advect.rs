@@ -1,6 +1,8 @@
-use super::*;
-use crate::math::random::CounterRng;
-use crate::types::{FieldLayout, Status};
+//! Points carried along by a field, with their covariance.
+
+use jacoflow::flow::advect;
+use jacoflow::math::random::CounterRng;
+use jacoflow::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, SamplingGrid, Status};
 use proptest::prelude::*;
 
 const MOTION: [f64; 6] = [1.2, -0.7, 0.05, 0.04, -0.06, 0.03];
