@@ -63,12 +63,11 @@ __all__ = [
     "_mixture_dirichlet_fit",
     "_mixture_fit",
     "_mixture_partial_fit",
-    "_motion3d_beside",
     "_motion3d_bound",
     "_motion3d_contact_map",
     "_motion3d_essential",
     "_motion3d_estimate",
-    "_motion3d_field_patches",
+    "_motion3d_estimate_field",
     "_motion3d_field_points",
     "_motion3d_focus",
     "_motion3d_predict",
@@ -1280,20 +1279,19 @@ def _mixture_partial_fit(
 def _mixture_densities(
     points: NDArray[np.float64], components: dict[str, Any], threads: int | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-def _motion3d_beside(
-    rotation: ArrayLike, tangent: ArrayLike, covariance: ArrayLike, object_rotation_std: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None: ...
 def _motion3d_bound(
-    points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, layout: dict[str, Any]
+    points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, jacobian: bool, layout: dict[str, Any]
 ) -> dict[str, NDArray[np.float64]]: ...
 def _motion3d_contact_map(
-    field: FlowField, intrinsics: ArrayLike, known: dict[str, Any], placement: str
+    field: FlowField, intrinsics: ArrayLike | None, known: dict[str, Any], placement: str
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
 def _motion3d_essential(translation: ArrayLike, rotation: ArrayLike) -> NDArray[np.float64]: ...
-def _motion3d_estimate(points: ArrayLike, flow: ArrayLike, layout: dict[str, Any], options: dict[str, Any]) -> dict[str, Any]: ...
-def _motion3d_field_patches(
-    field: FlowField, size: int, region: Sequence[int] | None
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], list[float]]: ...
+def _motion3d_estimate(
+    points: ArrayLike, flow: ArrayLike, jacobian: ArrayLike | None, layout: dict[str, Any], options: dict[str, Any]
+) -> dict[str, Any]: ...
+def _motion3d_estimate_field(
+    field: FlowField, intrinsics: ArrayLike | None, layout: dict[str, Any], options: dict[str, Any]
+) -> tuple[dict[str, Any], NDArray[np.float64]]: ...
 def _motion3d_field_points(
     field: FlowField, spacing: float | None, most: int | None, region: Sequence[int] | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], list[float]]: ...
@@ -1301,7 +1299,7 @@ def _motion3d_focus(
     translation: ArrayLike, tangent: ArrayLike, covariance: ArrayLike, intrinsics: ArrayLike | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None: ...
 def _motion3d_predict(
-    points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, intrinsics: ArrayLike | None, spherical: bool, whole_frame: bool
+    points: ArrayLike, inverse_depth: ArrayLike, translation: ArrayLike, rotation: ArrayLike, intrinsics: ArrayLike | None, projection: str, whole_frame: bool
 ) -> NDArray[np.float64]: ...
 def _motion3d_lateral(flow: ArrayLike, noise_std: float | None, weights: str) -> dict[str, Any]: ...
 def _motion3d_lateral_bound(inverse_depth: ArrayLike, noise_std: float) -> dict[str, float]: ...

@@ -144,7 +144,12 @@ impl EgomotionCommand {
         let threads = compute(&self.compute)?.0;
         Ok(EgomotionPlan {
             camera: intrinsics(&self.intrinsics)?,
-            field: FieldOptions { spacing: self.spacing, most: self.max_points, region: self.grid.region },
+            field: FieldOptions {
+                spacing: self.spacing,
+                most: self.max_points,
+                region: self.grid.region,
+                ..FieldOptions::default()
+            },
             motion: MotionOptions {
                 method,
                 robust: !self.no_robust,

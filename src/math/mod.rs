@@ -9,5 +9,6 @@ mod ziggurat;
 
 pub use real::Real;
 pub(crate) use statistics::{
-    MAD_TO_STD, central_median, geman_mcclure, median, nearest_quantile, quantile, robust_std,
+    MAD_TO_STD, RARE_STDS, by_chance, central_median, chi2_deviation, geman_mcclure, median, nearest_quantile,
+    quantile, robust_std,
 };

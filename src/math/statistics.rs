@@ -1,4 +1,4 @@
-//! Order statistics, and the scale of noise that they give among outliers.
+//! Order statistics, the scale of noise that they give among outliers, and chi-squared tests.
 //!
 //! Functions reorder their values. NaN counts as greater than every number.
 
@@ -50,6 +50,21 @@ fn select<T: Real>(values: &mut [T], place: usize) -> Option<T> {
     (place < values.len()).then(|| *values.select_nth_unstable_by(place, in_order).1)
 }
 
+/// The 0.999 quantile of the standard normal distribution.
+pub(crate) const RARE_STDS: f64 = 3.0902;
+
+/// How far, in standard deviations, a chi-squared value of `degrees` degrees of freedom lies from its
+/// expectation (E. Wilson, M. Hilferty 1931: its cube root is nearly normal).
+pub(crate) fn chi2_deviation(chi2: f64, degrees: f64) -> f64 {
+    let spread = 2.0 / (9.0 * degrees);
+    ((chi2 / degrees).cbrt() - (1.0 - spread)) / spread.sqrt()
+}
+
+/// Whether chance gives so large a value or a larger one more often than once in a thousand times.
+pub(crate) fn by_chance(chi2: f64, degrees: f64) -> bool {
+    chi2_deviation(chi2, degrees) < RARE_STDS
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,5 +96,13 @@ mod tests {
         let rng = crate::math::random::CounterRng::new(3);
         let mut sizes: Vec<f64> = (0..20_001).map(|k| (2.5 * rng.normal(k)).abs()).collect();
         assert!((robust_std(&mut sizes).unwrap() / 2.5 - 1.0).abs() < 0.03);
+    }
+
+    #[test]
+    fn deviations_are_those_of_chi_squared() {
+        // Upper 0.001 quantiles of chi-squared with 7, 100 and 597 degrees of freedom.
+        for (degrees, quantile) in [(7.0, 24.322), (100.0, 149.449), (597.0, 709.5)] {
+            assert!((chi2_deviation(quantile, degrees) - RARE_STDS).abs() < 0.05, "{degrees}");
+        }
     }
 }

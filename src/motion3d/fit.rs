@@ -9,16 +9,16 @@ use super::model::motion::Motion;
 use super::model::observations::{Observations, Scaled};
 use super::model::options::{Method, MotionOptions};
 use super::model::result::{Alternative, MotionEstimate, Status};
-use super::model::statistics::by_chance;
 use super::model::whitening::Whitening;
 use super::robust::{CompetingMotion, Consensus, larger};
 use super::solver::covariance::{PluginCovariances, direction_deviation, plugged};
-use super::solver::efficient::{Efficient, WeightDepths, beyond_theory, unsolved};
+use super::solver::efficient::{Efficient, beyond_theory, covariance_at};
 use super::solver::finite_rotation::{matters, settle, shift};
 use super::solver::likelihood::{Candidate, DISTINCT, Trial, choose, different, minima, near_best, smoothed};
 use super::solver::profile_likelihood::ProfileLikelihood;
 use super::solver::refine::{Minimum, StoppingCriteria, refine};
 use super::solver::smoothing::DepthSmoother;
+use crate::math::by_chance;
 use crate::math::random::CounterRng;
 use rayon::prelude::*;
 
@@ -212,7 +212,7 @@ impl Task<'_, '_> {
             Method::Efficient => true,
             Method::MaximumLikelihood => false,
         };
-        let plugged = plugged(&chosen.minimum.equations);
+        let plugged = plugged(&chosen.minimum.equations.h, &chosen.minimum.equations.p);
         let low = plugged.is_none();
         let several = near_best(candidates, inliers.n).len() > 1;
         let Minimum { motion, tangent, .. } = &chosen.minimum;
@@ -241,9 +241,7 @@ impl Task<'_, '_> {
         let unknown = low && improved.is_none();
         let mut solution = Solution::new(&chosen, plugged.as_ref(), improved, wanted);
         if unknown {
-            let mut smoother = self.smoother(inliers);
-            let at = unsolved(inliers, &solution.motion, WeightDepths::Smoothed(&mut smoother));
-            solution.covariance = at.map(|at| at.covariance);
+            solution.covariance = covariance_at(inliers, &solution.motion, &mut self.smoother(inliers));
         }
         let deviation = plugged.as_ref().map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
         Solved { solution, deviation, low, described, undecided }
@@ -255,7 +253,7 @@ impl Task<'_, '_> {
         if let Some(known) = self.known {
             solution.weighted_by_posterior(&scaled.observations, known, self.options.weight_depths.is_some());
         }
-        let common = solution.systematic_effect(inliers, self.whitening.flow, &self.options.common);
+        let common = solution.systematic_effect(inliers, self.whitening.flow, &self.options.common());
         let length = self.options.correlation_length.filter(|length| *length > 0.0);
         solution.add_correlation(inliers, self.whitening.flow, length);
         let wider = match (scaled.unknown, self.known) {

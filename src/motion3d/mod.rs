@@ -22,8 +22,7 @@
 //!
 //! The data pass `model` (rows of unit noise), `robust` (outliers; it searches with `solver` and `kernels`),
 //! `fit` (minima and weights, by `solver`) and `diagnostics` (covariance, status, report); `estimate` is the
-//! entry point. `patches` does the same for affine flow, `field` and `field_patches` take points and windows
-//! of flow fields, `bound` predicts covariances, `lateral` is the closed form without rotation.
+//! entry point. `patches` does the same for affine flow, `field` takes points or windows of flow fields, `bound` predicts covariances, `lateral` is the closed form without rotation.
 //!
 //! ```
 //! use jacoflow::motion3d::{Flow, Method, Motion, MotionOptions, Noise, Placement, Status, estimate_motion};
@@ -47,7 +46,6 @@ mod bound;
 mod diagnostics;
 mod estimate;
 mod field;
-mod field_patches;
 mod fit;
 mod kernels;
 mod lateral;
@@ -64,8 +62,9 @@ pub(crate) use bound::check_motion;
 pub use bound::motion_bound;
 pub use diagnostics::contact::{ContactMap, contact_map};
 pub use estimate::estimate_motion;
-pub use field::{FieldOptions, FieldPoints, field_points};
-pub use field_patches::{FieldPatches, field_patches};
+pub use field::{
+    FieldMotion, FieldOptions, FieldPatches, FieldPoints, estimate_field_motion, field_patches, field_points,
+};
 pub use lateral::{LateralBound, LateralEstimate, LateralWeights, estimate_lateral, lateral_bound};
 pub use model::camera::Intrinsics;
 pub use model::input::{Flow, Noise, Placement};

@@ -73,8 +73,8 @@ mod _jacoflow {
     use super::mixture::{mixture_densities, mixture_fit, mixture_partial_fit};
     #[pymodule_export]
     use super::motion3d::{
-        motion3d_beside, motion3d_bound, motion3d_contact_map, motion3d_essential, motion3d_estimate,
-        motion3d_field_patches, motion3d_field_points, motion3d_focus, motion3d_lateral, motion3d_lateral_bound,
+        motion3d_bound, motion3d_contact_map, motion3d_essential, motion3d_estimate, motion3d_estimate_field,
+        motion3d_field_points, motion3d_focus, motion3d_lateral, motion3d_lateral_bound,
         motion3d_predict,
     };
     #[pymodule_export]

@@ -98,7 +98,7 @@ def test_options_that_a_field_does_not_have_are_refused_by_name():
         ({"scene": dataclasses.replace(whole, rotation=np.full(3, np.nan)), "region": box}, ["scene: ", "rotation is known"]),
         ({"patches": 7}, ["patches: ", "at least 8"]),
         ({"patches": 0}, ["patches: ", "positive"]),
-        ({"patches": 32, "robust": True}, ["robust: ", "patches"]),
+        ({"patches": 32, "robust": True}, ["robust: ", "patch"]),
         ({"patches": 32, "scene": whole, "region": box}, ["scene: ", "patches"]),
         ({"patches": 32, "spacing": 8.0}, ["spacing: ", "patches"]),
         ({"patches": 32, "max_points": 8}, ["max_points: ", "patches"]),

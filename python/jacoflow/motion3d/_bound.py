@@ -67,5 +67,5 @@ def motion_bound(
     NotObservableError
         When the points do not determine the motion, as points at one place.
     """
-    given = layout(K, noise_std, cov, projection, switch("jacobian", jacobian))
-    return MotionBound(**_motion3d_bound(points, inv_depth, translation, rotation, given))
+    given = layout(K, noise_std, cov, projection)
+    return MotionBound(**_motion3d_bound(points, inv_depth, translation, rotation, switch("jacobian", jacobian), given))

@@ -2,13 +2,36 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable
+from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
 from .._jacoflow import _motion3d_estimate
-from ._checks import unless_default, count, layout, number, pair, six, switch, whole, word
+from ._checks import layout, number, optional, pair, switch, whole, word
 from ._results import MotionEstimate, estimate_of
+
+OPTIONS: dict[str, tuple[object, Callable[[str, Any], Any]]] = {
+    "method": ("auto", word),
+    "robust": (False, switch),
+    "placement": ("midpoint", word),
+    "smoother": ("auto", word),
+    "weight_inv_depth": (None, lambda name, value: value),
+    "rotation_prior": (None, pair),
+    "initial": (None, pair),
+    "points_per_independent_sample": (None, number),
+    "correlation_length": (None, number),
+    "flow_scale_std": (None, number),
+    "flow_bias_std": (None, number),
+    "random_state": (0, whole),
+    "threads": (None, optional(whole)),
+}
+"""Options of an estimate: what is meant where they are not given, and the check of their kind."""
+
+
+def options_of(given: dict[str, Any]) -> dict[str, Any]:
+    """The options as the compiled module takes them."""
+    return {name: check(name, given[name]) if name in given else default for name, (default, check) in OPTIONS.items()}
 
 
 def estimate_motion(
@@ -88,13 +111,21 @@ def estimate_motion(
     ValueError
         For shapes and values that do not fit; each message names the argument.
     """
-    for name, value in (("method", method), ("placement", placement), ("smoother", smoother)):
-        word(name, value)
-    given = layout(K, noise_std, cov, projection, jacobian is not None)
-    options = {
-        "method": method, "robust": switch("robust", robust), "placement": placement, "smoother": smoother, "weight_inv_depth": weight_inv_depth,
-        "rotation_prior": pair("rotation_prior", rotation_prior), "initial": pair("initial", initial), "points_per_independent_sample": unless_default(1, number("points_per_independent_sample", points_per_independent_sample)), "correlation_length": unless_default(0, number("correlation_length", correlation_length)), "flow_scale_std": number("flow_scale_std", flow_scale_std), "flow_bias_std": number("flow_bias_std", flow_bias_std), "random_state": whole("random_state", random_state), "threads": None if threads is None else count("threads", threads),
-    }  # fmt: skip
-    if jacobian is not None:
-        flow = six(flow, jacobian)
-    return estimate_of(_motion3d_estimate(points, flow, given, options))
+    options = options_of(
+        {
+            "method": method,
+            "robust": robust,
+            "placement": placement,
+            "smoother": smoother,
+            "weight_inv_depth": weight_inv_depth,
+            "rotation_prior": rotation_prior,
+            "initial": initial,
+            "points_per_independent_sample": points_per_independent_sample,
+            "correlation_length": correlation_length,
+            "flow_scale_std": flow_scale_std,
+            "flow_bias_std": flow_bias_std,
+            "random_state": random_state,
+            "threads": threads,
+        }
+    )
+    return estimate_of(_motion3d_estimate(points, flow, jacobian, layout(K, noise_std, cov, projection), options))

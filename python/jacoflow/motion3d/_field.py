@@ -7,13 +7,10 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
-from .._jacoflow import FlowField, _motion3d_beside, _motion3d_contact_map, _motion3d_field_patches, _motion3d_field_points
-from ._checks import Array, count, kind, number, word
-from ._estimate import estimate_motion
-from ._results import CommonEffect, MotionEstimate
-
-OPTIONS = frozenset(estimate_motion.__kwdefaults__ or ())
-"""Options of the estimate that come from the field are refused by name."""
+from .._jacoflow import FlowField, _motion3d_contact_map, _motion3d_estimate_field
+from ._checks import Array, kind, number, optional, whole, word
+from ._estimate import OPTIONS, options_of
+from ._results import CommonEffect, MotionEstimate, estimate_of
 
 FIELD_OWN = {
     "noise_std": "has covariances of its own",
@@ -21,6 +18,7 @@ FIELD_OWN = {
     "jacobian": "has a Jacobian of its own, which patches= uses",
     "projection": "is one of the plane",
 }
+"""Options of `estimate_motion` that a field has of its own, and which it has."""
 
 
 def estimate_field_motion(
@@ -67,55 +65,24 @@ def estimate_field_motion(
         For a `field` or `scene` that is none, and for options that are not known.
     """
     kind("field", field, FlowField)
-    if K is None:
-        raise ValueError("K: expected a camera matrix (3, 3), px, for a field's points are pixels; got None")
-    if not 0 < number("object_rotation_std", object_rotation_std) < float("inf"):
-        raise ValueError(f"object_rotation_std: expected a positive number, got {object_rotation_std}")
-    options = _own(options)
-    if patches is not None:
-        _refuse_with_patches(spacing=spacing, max_points=max_points, scene=scene, robust=options.get("robust") or None)
-        points, six, covariances, (scale, offset) = _motion3d_field_patches(field, count("patches", patches), region)
-        slopes = six[:, 2:].reshape(-1, 2, 2).transpose(0, 2, 1)
-        return estimate_motion(points, six[:, :2], K, cov=covariances, jacobian=slopes, **{"flow_scale_std": scale, "flow_bias_std": offset, **options}), points
-    if scene is not None:
-        if options.get("rotation_prior") is not None:
-            raise ValueError("rotation_prior: expected None with a scene, whose rotation it would be, got both")
-        options["rotation_prior"] = _beside(scene, object_rotation_std, region)
-    points, flow, covariances, (_, shared, length, scale, offset) = _motion3d_field_points(field, None if spacing is None else number("spacing", spacing), None if max_points is None else count("max_points", max_points), region)
-    return estimate_motion(points, flow, K, cov=covariances, **{"robust": True, "points_per_independent_sample": shared, "correlation_length": length, "flow_scale_std": scale, "flow_bias_std": offset, **options}), points
-
-
-def _own(options: dict[str, Any]) -> dict[str, Any]:
-    """The options without those that come from the field, which are refused unless they say nothing else."""
     for name, value in options.items():
-        if name not in OPTIONS:
+        if name in FIELD_OWN:
+            if value is not None and (name, value) != ("projection", "plane"):
+                raise ValueError(f"{name}: expected none, as a field {FIELD_OWN[name]}, got {value!r}")
+        elif name not in OPTIONS:
             raise TypeError(f"{name}: expected an option of estimate_field_motion or of estimate_motion, got one that neither has")
-        nothing = value is None or (name == "projection" and isinstance(value, str) and value == "plane")
-        if name in FIELD_OWN and not nothing:
-            raise ValueError(f"{name}: expected none, as a field {FIELD_OWN[name]}; got {_kind(value)}")
-    return {name: value for name, value in options.items() if name not in FIELD_OWN}
-
-
-def _kind(value: object) -> str:
-    return repr(value) if isinstance(value, int | float | str) else type(value).__name__
-
-
-def _refuse_with_patches(**given: object) -> None:
-    for name, value in given.items():
-        if value is not None:
-            raise ValueError(f"{name}: expected its default with patches, got {_kind(value)}")
-
-
-def _beside(scene: MotionEstimate, object_rotation_std: float, region: Sequence[int] | None) -> tuple[Array, Array]:
-    """The rotation prior of an object from the scene's rotation."""
-    if not isinstance(scene, MotionEstimate):
-        raise TypeError(f"scene: expected a MotionEstimate, got {_kind(scene)}")
-    if region is None:
-        raise ValueError("scene: expected a region beside it, of the object whose motion is wanted, got no region")
-    known = _motion3d_beside(scene.rotation, scene.tangent, scene.covariance, object_rotation_std)
-    if known is None:
-        raise ValueError(f"scene: expected a motion whose rotation is known, got one with the status {scene.status!r}")
-    return known
+    if scene is not None:
+        kind("scene", scene, MotionEstimate)
+    chosen = {
+        "spacing": optional(number)("spacing", spacing),
+        "max_points": optional(whole)("max_points", max_points),
+        "region": region,
+        "patches": optional(whole)("patches", patches),
+        "scene": scene and (scene.status, scene.rotation, scene.covariance),
+        "object_rotation_std": number("object_rotation_std", object_rotation_std),
+    }
+    found, points = _motion3d_estimate_field(field, K, chosen, options_of({"robust": patches is None, **options}))
+    return estimate_of(found), points
 
 
 def time_to_contact_map(

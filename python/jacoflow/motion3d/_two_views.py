@@ -7,7 +7,7 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 from .._jacoflow import _motion3d_essential, _motion3d_predict
-from ._checks import Array, kind, switch
+from ._checks import Array, kind, switch, word
 from ._results import MotionEstimate, MotionSolution
 
 
@@ -45,11 +45,7 @@ def predict_flow(
     ValueError
         For shapes and values that do not fit.
     """
-    if projection not in ("plane", "sphere"):
-        raise ValueError(f'projection: expected "plane" or "sphere", got {projection!r}')
-    if switch("whole_frame", whole_frame) and projection == "sphere":
-        raise ValueError("whole_frame: expected False on the sphere, whose flow is instantaneous, got True")
-    return _motion3d_predict(points, inv_depth, translation, rotation, K, projection == "sphere", bool(whole_frame))
+    return _motion3d_predict(points, inv_depth, translation, rotation, K, word("projection", projection), switch("whole_frame", whole_frame))
 
 
 def essential_matrix(result: MotionEstimate | MotionSolution) -> Array:

@@ -2,10 +2,9 @@
 
 use crate::error::Result;
 use crate::math::Real;
-use crate::motion3d::field::measured;
 use crate::motion3d::model::camera::Intrinsics;
 use crate::motion3d::model::derotation::{Derotation, MidpointDepth};
-use crate::motion3d::model::input::Placement;
+use crate::motion3d::model::input::{Placement, check_field};
 use crate::motion3d::model::observations::Row;
 use crate::motion3d::model::result::{CommonEffect, UncertainMotion};
 use crate::motion3d::model::rows::{Matrix5, Vector5};
@@ -133,7 +132,7 @@ pub fn contact_map<T: Real>(
     known: &UncertainMotion,
     placement: Placement,
 ) -> Result<ContactMap> {
-    measured(field)?;
+    check_field(field)?;
     let (rates, motion) = (Rates::new(known), &known.motion);
     let turning = motion.translation[0].is_nan() && motion.rotation[0].is_finite();
     let turn = (placement == Placement::Midpoint).then(|| motion.derotation());

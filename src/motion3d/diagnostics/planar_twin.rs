@@ -10,11 +10,11 @@
 //! lines.
 
 use crate::math::random::CounterRng;
+use crate::math::{RARE_STDS, by_chance, chi2_deviation};
 use crate::motion3d::kernels::{Depths, depths};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Row};
 use crate::motion3d::model::rows::Rows;
-use crate::motion3d::model::statistics::{RARE, by_chance, chi2_deviation};
 use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use crate::motion3d::solver::starts::at_most;
@@ -159,7 +159,7 @@ pub(crate) fn planar_twin(
     // more than one alone.
     let usual = if unknown { 3.0f64.sqrt() } else { 1.0 };
     let fits = |plane: &PlaneFlow| {
-        chi2_deviation(plane.chi2, plane.free / observations.points_per_independent_sample) < usual * RARE
+        chi2_deviation(plane.chi2, plane.free / observations.points_per_independent_sample) < usual * RARE_STDS
     };
     // What is far from a plane is so for few points already.
     if observations.n > FEW {

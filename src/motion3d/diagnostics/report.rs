@@ -56,7 +56,8 @@ pub(crate) fn report(
         out.direction_std = direction_deviation(covariance);
         out.rotation_std = std::array::from_fn(|i| covariance[(2 + i, 2 + i)].sqrt());
     }
-    if let Some(plugged) = plugged(&equations(inliers, motion, &solution.tangent, None)) {
+    let here = equations(inliers, motion, &solution.tangent, None);
+    if let Some(plugged) = plugged(&here.h, &here.p) {
         out.bound = nested(&plugged.bound);
     }
     let mut seen = depths(all, motion);
@@ -137,7 +138,7 @@ pub(crate) fn rotation_report(
     if let Some(length) = options.correlation_length.filter(|length| *length > 0.0) {
         covariance = correlated_rotation_covariance(&covariance, inliers, &rotation.rotation, flow, length);
     }
-    let common = options.common.added_to_rotation(&rotation.rotation, &moved);
+    let common = options.common().added_to_rotation(&rotation.rotation, &moved);
     if let Some(known) = &inliers.prior
         && let Some((added, alone)) =
             rotation_contradiction(known, &rotation.rotation, &rotation.covariance, &covariance, &common)

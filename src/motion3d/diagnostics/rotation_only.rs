@@ -1,7 +1,7 @@
 //! Scenes that do not determine a motion: no translation, one plane.
 
+use crate::math::by_chance;
 use crate::motion3d::model::observations::{Observations, ROUNDING};
-use crate::motion3d::model::statistics::by_chance;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// Least squares for the rotation alone.

@@ -5,12 +5,12 @@
 //! away by `D^-1 g`, and to a rotation that is `d = (L^-1 + (D^-1)_ww) g` from `w0`. Where both are right,
 //! `d` has the covariance `L^-1 + C_ww` with that of the flow alone.
 
+use crate::math::by_chance;
 use crate::motion3d::kernels::{add_to_rotation, equations};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{KnownRotation, Observations};
 use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
-use crate::motion3d::model::statistics::by_chance;
 use crate::motion3d::solver::covariance::inverse;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use nalgebra::{Matrix3, Vector3};

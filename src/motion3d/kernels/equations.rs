@@ -1,6 +1,9 @@
 //! Sums of one Gauss-Newton step.
 
-use super::{Everywhere, Planes, UPPER, add_to_rotation, at, both_axes, dot, over_chunks, see, total, turn};
+use super::{
+    Everywhere, View, add_products, add_to_rotation, along_axes, at, both_axes, over_chunks, see, slope_row, symmetric,
+    total,
+};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
@@ -34,10 +37,7 @@ impl Equations {
 }
 
 struct EquationSums<'a> {
-    planes: Planes<'a>,
-    motion: &'a Motion,
-    tangent: &'a Matrix2x3<f64>,
-    floor: f64,
+    view: View<'a>,
     inverse_cut: f64,
 }
 
@@ -47,28 +47,22 @@ impl Kernel<f64> for EquationSums<'_> {
     type Output = [f64; EQUATION_SUMS];
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) -> [f64; EQUATION_SUMS] {
-        let motion = Everywhere::<V>::new(self.motion);
-        let [first, second] = both_axes::<V>(self.tangent);
-        let (floor, cut, one) = (V::splat(self.floor), V::splat(self.inverse_cut), V::constant(1.0));
+        let View { planes, motion, tangent, floor } = self.view;
+        let (motion, axes) = (Everywhere::<V>::new(motion), both_axes::<V>(tangent));
+        let (floor, cut, one) = (V::splat(floor), V::splat(self.inverse_cut), V::constant(1.0));
         let mut sums = [V::zero(); EQUATION_SUMS];
-        for i in (0..self.planes[0].len()).step_by(V::LANES) {
-            let seen = see(&self.planes, i, &motion, floor);
+        for i in (0..planes[0].len()).step_by(V::LANES) {
+            let seen = see(&planes, i, &motion, floor);
             let e2 = seen.across * seen.across * seen.inverse;
             // Tukey's weight (1 - (e / cut)^2)^2, 1 without a cut.
             let rest = one - (e2 * cut).min(one);
             let weight = rest * rest * seen.inverse;
             let nu = seen.along * seen.inverse;
-            let a = turn(&seen.t, dot(&self.planes, 0, i, &first), dot(&self.planes, 3, i, &first));
-            let b = turn(&seen.t, dot(&self.planes, 0, i, &second), dot(&self.planes, 3, i, &second));
-            let d = [nu * a, nu * b, seen.q[0], seen.q[1], seen.q[2]];
-            let mut k = 0;
+            let [a, b] = along_axes(&planes, i, &seen, &axes);
+            let d = slope_row(nu, [a, b], &seen);
+            add_products(&mut sums, &d, weight);
             for row in 0..5 {
-                let weighted = d[row] * weight;
-                for column in row..5 {
-                    sums[k] = weighted.mul_add(d[column], sums[k]);
-                    k += 1;
-                }
-                sums[15 + row] = weighted.mul_add(seen.across, sums[15 + row]);
+                sums[15 + row] = (d[row] * weight).mul_add(seen.across, sums[15 + row]);
             }
             let twice = weight * seen.inverse;
             sums[20] = (a * twice).mul_add(a, sums[20]);
@@ -94,27 +88,26 @@ pub(crate) fn equations(
 ) -> Equations {
     let inverse_cut = cut.map_or(0.0, |cut| 1.0 / (cut * cut));
     let sums = over_chunks(observations, |range| {
-        let planes = observations.slices(&range);
-        dispatch(observations.level, EquationSums { planes, motion, tangent, floor: observations.floor, inverse_cut })
+        let view = View::new(observations, &range, motion, tangent);
+        dispatch(observations.level, EquationSums { view, inverse_cut })
     });
-    let (mut h, mut p) = (Matrix5::zeros(), Matrix5::zeros());
-    for (value, &(i, j)) in sums.iter().zip(&UPPER) {
-        h[(i, j)] = *value;
-        h[(j, i)] = *value;
-    }
-    let mut gradient = Vector5::from_column_slice(&sums[15..20]);
-    let mut cost = cut.map_or(sums[23], |cut| cut * cut / 3.0 * sums[24]);
+    let cost = cut.map_or(sums[23], |cut| cut * cut / 3.0 * sums[24]);
+    let (h, gradient, cost) = with_prior(observations, motion, &sums, cost);
+    let mut p = Matrix5::zeros();
+    (p[(0, 0)], p[(0, 1)], p[(1, 0)], p[(1, 1)]) = (sums[20], sums[21], sums[21], sums[22]);
+    Equations { h, gradient, p, cost, behind: sums[25], reversed: sums[26] }
+}
+
+/// `H` and the gradient of the first 20 sums, and the cost, with what is known of the rotation.
+fn with_prior(observations: &Observations, motion: &Motion, sums: &[f64], mut cost: f64) -> (Matrix5, Vector5, f64) {
+    let (mut h, mut gradient) = (symmetric(&sums[..15]), Vector5::from_column_slice(&sums[15..20]));
     if let Some(known) = &observations.prior {
         let (pull, square) = known.pull(&motion.w());
         add_to_rotation(&mut h, &known.information, 1.0);
         gradient.fixed_rows_mut::<3>(2).add_assign(&pull);
         cost += square;
     }
-    p[(0, 0)] = sums[20];
-    p[(0, 1)] = sums[21];
-    p[(1, 0)] = sums[21];
-    p[(1, 1)] = sums[22];
-    Equations { h, gradient, p, cost, behind: sums[25], reversed: sums[26] }
+    (h, gradient, cost)
 }
 
 /// The sums of one Gauss-Newton step, with depths that must not be negative.
@@ -126,39 +119,28 @@ pub(crate) struct FrontEquations {
     pub cost: f64,
 }
 
-pub(crate) struct FrontSums<'a> {
-    planes: Planes<'a>,
-    motion: &'a Motion,
-    tangent: &'a Matrix2x3<f64>,
-    floor: f64,
-}
+struct FrontSums<'a>(View<'a>);
 
-pub(crate) const SUMS: usize = 21;
+const FRONT_SUMS: usize = 21;
 
 impl Kernel<f64> for FrontSums<'_> {
-    type Output = [f64; SUMS];
+    type Output = [f64; FRONT_SUMS];
     #[inline(always)]
-    fn run<V: Lanes<Scalar = f64>>(self) -> [f64; SUMS] {
-        let motion = Everywhere::<V>::new(self.motion);
-        let [first, second] = both_axes::<V>(self.tangent);
-        let (floor, one, none) = (V::splat(self.floor), V::constant(1.0), V::zero());
-        let mut sums = [V::zero(); SUMS];
-        for i in (0..self.planes[0].len()).step_by(V::LANES) {
-            let seen = see(&self.planes, i, &motion, floor);
+    fn run<V: Lanes<Scalar = f64>>(self) -> [f64; FRONT_SUMS] {
+        let View { planes, motion, tangent, floor } = self.0;
+        let (motion, axes) = (Everywhere::<V>::new(motion), both_axes::<V>(tangent));
+        let (floor, one, none) = (V::splat(floor), V::constant(1.0), V::zero());
+        let mut sums = [V::zero(); FRONT_SUMS];
+        for i in (0..planes[0].len()).step_by(V::LANES) {
+            let seen = see(&planes, i, &motion, floor);
             let before = V::select(seen.along.lt(none), none, one);
             let weight = before * seen.inverse;
             let nu = seen.along * seen.inverse;
-            let a = turn(&seen.t, dot(&self.planes, 0, i, &first), dot(&self.planes, 3, i, &first));
-            let b = turn(&seen.t, dot(&self.planes, 0, i, &second), dot(&self.planes, 3, i, &second));
-            let d = [nu * a, nu * b, seen.q[0], seen.q[1], seen.q[2]];
-            let mut k = 0;
+            let [a, b] = along_axes(&planes, i, &seen, &axes);
+            let d = slope_row(nu, [a, b], &seen);
+            add_products(&mut sums, &d, weight);
             for row in 0..5 {
-                let weighted = d[row] * weight;
-                for column in row..5 {
-                    sums[k] = weighted.mul_add(d[column], sums[k]);
-                    k += 1;
-                }
-                sums[15 + row] = weighted.mul_add(seen.across, sums[15 + row]);
+                sums[15 + row] = (d[row] * weight).mul_add(seen.across, sums[15 + row]);
             }
             // A point that would lie behind has depth 0: all that is left of it is what the rotation does not
             // explain.
@@ -168,10 +150,10 @@ impl Kernel<f64> for FrontSums<'_> {
             let counts = behind * seen.s2;
             let mut k = 9;
             for row in 0..3 {
-                let (rx, ry) = (at::<V>(&self.planes, 6 + row, i), at::<V>(&self.planes, 9 + row, i));
+                let (rx, ry) = (at::<V>(&planes, 6 + row, i), at::<V>(&planes, 9 + row, i));
                 for column in row..3 {
-                    let product = rx * at::<V>(&self.planes, 6 + column, i);
-                    let product = ry.mul_add(at::<V>(&self.planes, 9 + column, i), product);
+                    let product = rx * at::<V>(&planes, 6 + column, i);
+                    let product = ry.mul_add(at::<V>(&planes, 9 + column, i), product);
                     sums[k] = counts.mul_add(product, sums[k]);
                     k += 1;
                 }
@@ -191,21 +173,8 @@ pub(crate) fn front_equations(
     tangent: &Matrix2x3<f64>,
 ) -> FrontEquations {
     let sums = over_chunks(observations, |range| {
-        let planes = observations.slices(&range);
-        dispatch(observations.level, FrontSums { planes, motion, tangent, floor: observations.floor })
+        dispatch(observations.level, FrontSums(View::new(observations, &range, motion, tangent)))
     });
-    let mut h = Matrix5::zeros();
-    for (value, &(i, j)) in sums.iter().zip(&UPPER) {
-        h[(i, j)] = *value;
-        h[(j, i)] = *value;
-    }
-    let mut gradient = Vector5::from_column_slice(&sums[15..20]);
-    let mut cost = sums[20];
-    if let Some(known) = &observations.prior {
-        let (pull, square) = known.pull(&motion.w());
-        add_to_rotation(&mut h, &known.information, 1.0);
-        gradient.fixed_rows_mut::<3>(2).add_assign(&pull);
-        cost += square;
-    }
+    let (h, gradient, cost) = with_prior(observations, motion, &sums, sums[20]);
     FrontEquations { h, gradient, cost }
 }

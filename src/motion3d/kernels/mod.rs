@@ -43,6 +43,26 @@ struct Seen<V> {
 
 pub(crate) type Planes<'a> = [&'a [f64]; PLANES];
 
+/// Points of one chunk with the motion that their sums are taken at, in the axes of its direction.
+#[derive(Clone, Copy)]
+struct View<'a> {
+    planes: Planes<'a>,
+    motion: &'a Motion,
+    tangent: &'a Matrix2x3<f64>,
+    floor: f64,
+}
+
+impl<'a> View<'a> {
+    fn new(
+        observations: &'a Observations,
+        range: &Range<usize>,
+        motion: &'a Motion,
+        tangent: &'a Matrix2x3<f64>,
+    ) -> Self {
+        Self { planes: observations.slices(range), motion, tangent, floor: observations.floor }
+    }
+}
+
 impl<V: Lanes<Scalar = f64>> Everywhere<V> {
     #[inline(always)]
     fn new(motion: &Motion) -> Self {
@@ -98,6 +118,34 @@ fn see<V: Lanes<Scalar = f64>>(planes: &Planes<'_>, i: usize, motion: &Everywher
     Seen { s2, inverse, q, across: turn(&t, dx, dy), along: t[0].mul_add(dx, t[1] * dy), t }
 }
 
+/// `s D(nu)` for the depth 1 in both axes of the direction: `s p^t G` along them.
+#[inline(always)]
+fn along_axes<V: Lanes<Scalar = f64>>(planes: &Planes<'_>, i: usize, seen: &Seen<V>, axes: &[[V; 3]; 2]) -> [V; 2] {
+    [
+        turn(&seen.t, dot(planes, 0, i, &axes[0]), dot(planes, 3, i, &axes[0])),
+        turn(&seen.t, dot(planes, 0, i, &axes[1]), dot(planes, 3, i, &axes[1])),
+    ]
+}
+
+/// `s D(nu)`.
+#[inline(always)]
+fn slope_row<V: Lanes<Scalar = f64>>(nu: V, [a, b]: [V; 2], seen: &Seen<V>) -> [V; 5] {
+    [nu * a, nu * b, seen.q[0], seen.q[1], seen.q[2]]
+}
+
+/// Adds the upper triangle of `weight d^t d`, row by row.
+#[inline(always)]
+fn add_products<V: Lanes<Scalar = f64>, const N: usize>(sums: &mut [V], d: &[V; N], weight: V) {
+    let mut k = 0;
+    for row in 0..N {
+        let weighted = d[row] * weight;
+        for column in row..N {
+            sums[k] = weighted.mul_add(d[column], sums[k]);
+            k += 1;
+        }
+    }
+}
+
 /// The lanes' sum, in the order of the lanes.
 #[inline(always)]
 fn total<V: Lanes<Scalar = f64>>(lanes: V) -> f64 {
@@ -124,24 +172,17 @@ fn over_chunks<const N: usize>(
     sums
 }
 
-/// Indices of the upper triangle of a 5 x 5 matrix, row by row.
-const UPPER: [(usize, usize); 15] = [
-    (0, 0),
-    (0, 1),
-    (0, 2),
-    (0, 3),
-    (0, 4),
-    (1, 1),
-    (1, 2),
-    (1, 3),
-    (1, 4),
-    (2, 2),
-    (2, 3),
-    (2, 4),
-    (3, 3),
-    (3, 4),
-    (4, 4),
-];
+/// A symmetric matrix from its upper triangle, row by row.
+fn symmetric(upper: &[f64]) -> Matrix5 {
+    let mut matrix = Matrix5::zeros();
+    let mut values = upper.iter();
+    for i in 0..5 {
+        for (j, value) in (i..5).zip(&mut values) {
+            (matrix[(i, j)], matrix[(j, i)]) = (*value, *value);
+        }
+    }
+    matrix
+}
 
 /// Adds a 3 x 3 matrix, times a factor, to the block of the rotation.
 pub(crate) fn add_to_rotation(h: &mut Matrix5, information: &Matrix3<f64>, factor: f64) {

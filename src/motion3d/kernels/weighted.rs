@@ -1,6 +1,9 @@
 //! The estimating equation with given depths in its weights.
 
-use super::{Everywhere, Planes, Seen, UPPER, add_to_rotation, at, both_axes, dot, over_chunks, see, total, turn};
+use super::{
+    Everywhere, Planes, View, add_products, add_to_rotation, along_axes, at, both_axes, over_chunks, see, slope_row,
+    symmetric, total, turn,
+};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{KnownRotation, Observations};
 use crate::motion3d::model::rows::{Matrix5, Vector5};
@@ -10,11 +13,8 @@ use std::ops::AddAssign;
 
 /// `sum W^t W` for given depths in the weights, as the upper triangle.
 struct WeightSums<'a> {
-    planes: Planes<'a>,
+    view: View<'a>,
     nu: &'a [f64],
-    motion: &'a Motion,
-    tangent: &'a Matrix2x3<f64>,
-    floor: f64,
     /// `kappa^2`, the largest variance of the direction: weights are damped within that of the epipole.
     spread: f64,
 }
@@ -31,47 +31,20 @@ fn damped<V: Lanes<Scalar = f64>>(planes: &Planes<'_>, i: usize, s2: V, floor: V
     V::select(floor.lt(s2), V::constant(1.0) / size.mul_add(half_spread, s2), V::zero())
 }
 
-impl WeightSums<'_> {
-    /// `s D(nu)` and what else the points' equations need.
-    #[inline(always)]
-    fn row<V: Lanes<Scalar = f64>>(
-        planes: &Planes<'_>,
-        nu: &[f64],
-        i: usize,
-        motion: &Everywhere<V>,
-        axes: &[[V; 3]; 2],
-        floor: V,
-    ) -> (Seen<V>, [V; 5]) {
-        let seen = see(planes, i, motion, floor);
-        let nu = V::load(&nu[i..]);
-        let a = turn(&seen.t, dot(planes, 0, i, &axes[0]), dot(planes, 3, i, &axes[0]));
-        let b = turn(&seen.t, dot(planes, 0, i, &axes[1]), dot(planes, 3, i, &axes[1]));
-        let d = [nu * a, nu * b, seen.q[0], seen.q[1], seen.q[2]];
-        (seen, d)
-    }
-}
-
 impl Kernel<f64> for WeightSums<'_> {
     type Output = [f64; 15];
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) -> [f64; 15] {
-        let motion = Everywhere::<V>::new(self.motion);
-        let axes = both_axes(self.tangent);
-        let (floor, half_spread) = (V::splat(self.floor), V::splat(0.5 * self.spread));
+        let View { planes, motion, tangent, floor } = self.view;
+        let (motion, axes) = (Everywhere::<V>::new(motion), both_axes(tangent));
+        let (floor, half_spread) = (V::splat(floor), V::splat(0.5 * self.spread));
         let mut sums = [V::zero(); 15];
-        for i in (0..self.planes[0].len()).step_by(V::LANES) {
-            let (seen, d) = Self::row(&self.planes, self.nu, i, &motion, &axes, floor);
+        for i in (0..planes[0].len()).step_by(V::LANES) {
+            let seen = see(&planes, i, &motion, floor);
+            let d = slope_row(V::load(&self.nu[i..]), along_axes(&planes, i, &seen, &axes), &seen);
             // Each of both weights is damped: `s^2 / (s^2 + g kappa^2)`.
-            let inverse = damped(&self.planes, i, seen.s2, floor, half_spread);
-            let both = inverse * inverse * seen.s2;
-            let mut k = 0;
-            for row in 0..5 {
-                let weighted = d[row] * both;
-                for column in row..5 {
-                    sums[k] = weighted.mul_add(d[column], sums[k]);
-                    k += 1;
-                }
-            }
+            let inverse = damped(&planes, i, seen.s2, floor, half_spread);
+            add_products(&mut sums, &d, inverse * inverse * seen.s2);
         }
         sums.map(total)
     }
@@ -87,15 +60,10 @@ pub(crate) fn information(
     spread: f64,
 ) -> Matrix5 {
     let sums = over_chunks(observations, |range| {
-        let planes = observations.slices(&range);
-        let nu = &nu[range];
-        dispatch(observations.level, WeightSums { planes, nu, motion, tangent, floor: observations.floor, spread })
+        let view = View::new(observations, &range, motion, tangent);
+        dispatch(observations.level, WeightSums { view, nu: &nu[range], spread })
     });
-    let mut h = Matrix5::zeros();
-    for (value, &(i, j)) in sums.iter().zip(&UPPER) {
-        h[(i, j)] = *value;
-        h[(j, i)] = *value;
-    }
+    let mut h = symmetric(&sums);
     if let Some(known) = &observations.prior {
         add_to_rotation(&mut h, &known.information, 1.0);
     }
@@ -116,25 +84,24 @@ impl Kernel<f64> for SlopeSums<'_> {
     type Output = [f64; SLOPES];
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) -> [f64; SLOPES] {
-        let WeightSums { planes, nu, motion, tangent, floor, spread } = self.weights;
-        let motion = Everywhere::<V>::new(motion);
-        let axes = both_axes(tangent);
+        let WeightSums { view: View { planes, motion, tangent, floor }, nu, spread } = self.weights;
+        let (motion, axes) = (Everywhere::<V>::new(motion), both_axes(tangent));
         let (floor, half_spread) = (V::splat(floor), V::splat(0.5 * spread));
         let mut sums = [V::zero(); SLOPES];
         for i in (0..planes[0].len()).step_by(V::LANES) {
-            let (seen, [pulled, pushed, ..]) = WeightSums::row(&planes, nu, i, &motion, &axes, floor);
-            let a = turn(&seen.t, dot(&planes, 0, i, &axes[0]), dot(&planes, 3, i, &axes[0]));
-            let b = turn(&seen.t, dot(&planes, 0, i, &axes[1]), dot(&planes, 3, i, &axes[1]));
+            let seen = see(&planes, i, &motion, floor);
+            let [a, b] = along_axes(&planes, i, &seen, &axes);
+            let nu = V::load(&nu[i..]);
             // The noise of the own depth is in both factors, by its share in the weight.
             let own = seen.along * seen.inverse;
-            let both = V::load(&nu[i..]).mul_add(own, (V::zero() - V::load(&self.share[i..])) * seen.inverse);
+            let both = nu.mul_add(own, (V::zero() - V::load(&self.share[i..])) * seen.inverse);
             let weight = damped(&planes, i, seen.s2, floor, half_spread);
             let psi = both * weight;
             sums[0] = (psi * a).mul_add(a, sums[0]);
             sums[1] = (psi * a).mul_add(b, sums[1]);
             sums[2] = (psi * b).mul_add(b, sums[2]);
             let (own_a, own_b) = (own * a * weight, own * b * weight);
-            let (weight_a, weight_b) = (pulled * weight, pushed * weight);
+            let (weight_a, weight_b) = (nu * a * weight, nu * b * weight);
             let mut k = 15;
             for row in 0..3 {
                 let q = seen.q[row];
@@ -165,9 +132,8 @@ pub(crate) fn slope(
     spread: f64,
 ) -> Matrix5 {
     let sums = over_chunks(observations, |range| {
-        let planes = observations.slices(&range);
-        let nu = &nu[range.clone()];
-        let weights = WeightSums { planes, nu, motion, tangent, floor: observations.floor, spread };
+        let view = View::new(observations, &range, motion, tangent);
+        let weights = WeightSums { view, nu: &nu[range.clone()], spread };
         dispatch(observations.level, SlopeSums { weights, share: &share[range] })
     });
     let mut slope = Matrix5::zeros();
@@ -196,13 +162,13 @@ impl Kernel<f64> for BilinearSums<'_> {
     type Output = [f64; BILINEAR_SUMS];
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) -> [f64; BILINEAR_SUMS] {
-        let WeightSums { planes, nu, motion, tangent, floor, spread } = self.0;
-        let motion = Everywhere::<V>::new(motion);
-        let axes = both_axes(tangent);
+        let WeightSums { view: View { planes, motion, tangent, floor }, nu, spread } = self.0;
+        let (motion, axes) = (Everywhere::<V>::new(motion), both_axes(tangent));
         let (floor, half_spread) = (V::splat(floor), V::splat(0.5 * spread));
         let mut sums = [[V::zero(); 12]; 5];
         for i in (0..planes[0].len()).step_by(V::LANES) {
-            let (seen, d) = WeightSums::row(&planes, nu, i, &motion, &axes, floor);
+            let seen = see(&planes, i, &motion, floor);
+            let d = slope_row(V::load(&nu[i..]), along_axes(&planes, i, &seen, &axes), &seen);
             // V = W s / (s^2 + g kappa^2), and nothing at the epipole.
             let scale = damped(&planes, i, seen.s2, floor, half_spread);
             for c in 0..3 {
@@ -243,10 +209,8 @@ impl Bilinear {
         spread: f64,
     ) -> Self {
         let sums = over_chunks(observations, |range| {
-            let planes = observations.slices(&range);
-            let nu = &nu[range];
-            let weights = WeightSums { planes, nu, motion, tangent, floor: observations.floor, spread };
-            dispatch(observations.level, BilinearSums(weights))
+            let view = View::new(observations, &range, motion, tangent);
+            dispatch(observations.level, BilinearSums(WeightSums { view, nu: &nu[range], spread }))
         });
         Self { sums, prior: observations.prior }
     }

@@ -4,6 +4,7 @@ use super::camera::Intrinsics;
 use super::motion::Projection;
 use super::rows::tangents;
 use crate::error::{Error, Result, numbers};
+use crate::types::FlowField;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 /// Points with their flow, N of each.
@@ -132,6 +133,18 @@ impl Flow<'_> {
             _ => Ok(()),
         }
     }
+}
+
+/// Whether a field has covariances and is in px.
+pub(crate) fn check_field<T>(field: &FlowField<T>) -> Result<()> {
+    if field.covariance.is_none() {
+        return Err(Error::argument("field", "one with a covariance", "one without"));
+    }
+    if field.layout.pixel_pitch != (1.0, 1.0) {
+        let got = format!("the pixel pitch {:?}", field.layout.pixel_pitch);
+        return Err(Error::argument("field", "flow in px", got));
+    }
+    Ok(())
 }
 
 /// Asymmetry of a covariance, in shares of its largest entry, that is rounding.

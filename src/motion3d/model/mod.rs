@@ -13,5 +13,4 @@ pub(crate) mod observations;
 pub(crate) mod options;
 pub(crate) mod result;
 pub(crate) mod rows;
-pub(crate) mod statistics;
 pub(crate) mod whitening;

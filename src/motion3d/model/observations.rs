@@ -14,6 +14,9 @@ pub(crate) const CHUNK: usize = 4096;
 /// Lanes are filled up with points of weight 0 to a multiple of this.
 const ALIGN: usize = 8;
 
+/// Planes of an [`Observations`].
+pub(crate) const PLANES: usize = 14;
+
 /// `|G u| / |G|` below which a point sits on the epipole and says nothing.
 const EPIPOLE: f64 = 1e-9;
 
@@ -165,16 +168,8 @@ impl Observations {
             planes,
             position: chosen.iter().map(|k| self.position[pick(k)]).collect(),
             site: chosen.iter().map(|k| self.site[pick(k)]).collect(),
-            spherical: self.spherical,
             source: chosen.iter().map(|k| self.source[pick(k)]).collect(),
-            floor: self.floor,
-            level: self.level,
-            prior: self.prior,
-            points_per_independent_sample: self.points_per_independent_sample,
-            independent: self.independent,
-            displaced: self.displaced,
-            turn: self.turn,
-            units: self.units,
+            ..*self
         }
     }
 
@@ -294,9 +289,6 @@ impl KnownRotation {
         (pull, off.dot(&pull))
     }
 }
-
-/// Planes of an [`Observations`].
-pub(crate) const PLANES: usize = 14;
 
 /// Noise of flow that is exactly zero, in its unit.
 pub(crate) const MIN_NOISE: f64 = 1e-100;

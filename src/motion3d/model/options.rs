@@ -3,11 +3,14 @@
 use super::input::{Flow, Noise, Placement};
 use super::motion::{Motion, Projection};
 use super::observations::KnownRotation;
-use super::result::{CommonEffect, MotionEstimate, Moved};
+use super::result::{CommonEffect, Moved};
 use super::rows::{Matrix5, Vector5};
 use crate::error::{Error, Result, numbers};
 use crate::parallel::Threads;
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
+
+/// Largest common displacement: squares of larger ones are not finite.
+const MAX_BIAS: f64 = 1e100;
 
 /// Which estimator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -44,22 +47,14 @@ impl RotationPrior {
         known.rotation.iter().chain(known.information.iter()).all(|value| value.is_finite()).then_some(known)
     }
 
-    /// The prior for an object in a scene, which may rotate by itself by `object_rotation_std` (standard
-    /// deviation about each axis, rad/frame). `None` where the scene's is not known.
-    pub fn of_scene(scene: &MotionEstimate, object_rotation_std: f64) -> Option<Self> {
-        Self::from_scene_covariance(scene.motion.rotation, &scene.covariance, object_rotation_std)
-    }
-
-    /// The same from the scene's rotation and the covariance of its `(psi, w)`.
-    pub fn from_scene_covariance(
-        rotation: [f64; 3],
-        covariance: &[[f64; 5]; 5],
-        object_rotation_std: f64,
-    ) -> Option<Self> {
+    /// The prior for an object in a scene, from the scene's rotation and the covariance of its `(psi, w)`: the
+    /// object may rotate by itself by `object_rotation_std` (standard deviation about each axis, rad/frame).
+    /// `None` where the scene's rotation is not known.
+    pub fn of_scene(rotation: [f64; 3], covariance: &[[f64; 5]; 5], object_rotation_std: f64) -> Option<Self> {
         let own = |i, j| if i == j { object_rotation_std * object_rotation_std } else { 0.0 };
         let covariance = std::array::from_fn(|i| std::array::from_fn(|j| covariance[2 + i][2 + j] + own(i, j)));
-        let known = Self { rotation, covariance };
-        known.rotation.iter().chain(covariance.as_flattened()).all(|value| value.is_finite()).then_some(known)
+        let prior = Self { rotation, covariance };
+        rotation.iter().chain(covariance.as_flattened()).all(|value| value.is_finite()).then_some(prior)
     }
 }
 
@@ -91,8 +86,12 @@ pub struct MotionOptions {
     /// errors correlate (`together`), in no direction smaller than that of independent points. Default: not
     /// at all.
     pub correlation_length: Option<f64>,
-    /// Errors that all flow has in common, as flow from gradients has them. Default: none.
-    pub common: CommonErrors,
+    /// Standard deviation of a factor, about 1, that all flow is too long by, as flow from gradients is: no
+    /// residual shows it, and it is one of the rotation's length. From 0 to 1; default: 0.
+    pub flow_scale_std: Option<f64>,
+    /// Standard deviation of each component of a displacement that all flow has in common, in the unit of the
+    /// flow: most of it looks like a rotation. Not on the sphere. Default: 0.
+    pub flow_bias_std: Option<f64>,
     /// Seed of the random choices; default: 0.
     pub random_state: u64,
     /// Number of threads; the result does not depend on it.
@@ -100,6 +99,17 @@ pub struct MotionOptions {
 }
 
 impl MotionOptions {
+    /// Errors that all flow has in common.
+    pub(crate) fn common(&self) -> CommonErrors {
+        CommonErrors { scale: self.flow_scale_std.unwrap_or(0.0), offset: self.flow_bias_std.unwrap_or(0.0) }
+    }
+
+    /// The same options with these common errors where none are given.
+    pub(crate) fn with_common(&self, common: CommonErrors) -> Self {
+        let (flow_scale_std, flow_bias_std) = (self.flow_scale_std.or(Some(common.scale)), self.flow_bias_std);
+        Self { flow_scale_std, flow_bias_std: flow_bias_std.or(Some(common.offset)), ..self.clone() }
+    }
+
     pub(crate) fn check(&self, flow: &Flow<'_>, noise: &Noise<'_>) -> Result<()> {
         if let Some(depths) = self.weight_depths.as_ref().filter(|depths| depths.len() != flow.len()) {
             let expected = format!("{} values, one for each point", flow.len());
@@ -112,7 +122,7 @@ impl MotionOptions {
             return Err(Error::argument("rotation_prior", expected, format!("{rotation} with {covariance}")));
         }
         self.check_initial()?;
-        self.common.check(flow.projection())?;
+        self.check_common(flow.projection())?;
         self.check_correlation(noise)
     }
 
@@ -143,25 +153,36 @@ impl MotionOptions {
         }
     }
 
+    /// On the plane or the sphere.
+    pub(crate) fn check_common(&self, projection: Projection) -> Result<()> {
+        let CommonErrors { scale, offset } = self.common();
+        if !(0.0..=1.0).contains(&scale) {
+            return Err(Error::argument("flow_scale_std", "a number from 0 to 1", scale));
+        }
+        if !(0.0..=MAX_BIAS).contains(&offset) {
+            return Err(Error::argument("flow_bias_std", format!("a number from 0 to {MAX_BIAS:e}"), offset));
+        }
+        if projection == Projection::Sphere && offset > 0.0 {
+            return Err(Error::argument(
+                "flow_bias_std",
+                "0 on the sphere, whose flow has no common displacement",
+                offset,
+            ));
+        }
+        Ok(())
+    }
+
     fn check_correlation(&self, noise: &Noise<'_>) -> Result<()> {
         if let Some(length) = self.correlation_length.filter(|length| !(length.is_finite() && *length >= 0.0)) {
             return Err(Error::argument("correlation_length", "a number of at least 0", length));
         }
         match self.points_per_independent_sample {
-            Some(points_per_independent_sample)
-                if !(points_per_independent_sample.is_finite() && points_per_independent_sample >= 1.0) =>
-            {
-                Err(Error::argument(
-                    "points_per_independent_sample",
-                    "a number of at least 1",
-                    points_per_independent_sample,
-                ))
+            Some(points) if !(points.is_finite() && points >= 1.0) => {
+                Err(Error::argument("points_per_independent_sample", "a number of at least 1", points))
             }
-            Some(_) if matches!(noise, Noise::Unknown) => Err(Error::argument(
-                "points_per_independent_sample",
-                "a noise that is known",
-                "noise_std and cov left out",
-            )),
+            Some(points) if points > 1.0 && matches!(noise, Noise::Unknown) => {
+                Err(Error::argument("points_per_independent_sample", "1 without noise_std and cov", points))
+            }
             _ => Ok(()),
         }
     }
@@ -182,33 +203,13 @@ pub enum Smoother {
 /// Standard deviations of errors that all flow of a picture has in common. Default: 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CommonErrors {
-    /// Of a factor, about 1, that all flow is too long by: no residual shows it, and it is one of the
-    /// rotation's length.
+    /// Of the factor, see [`MotionOptions::flow_scale_std`].
     pub scale: f64,
-    /// Of each component of one displacement, in the unit of the flow: most of it looks like a rotation. Not
-    /// on the sphere.
+    /// Of the displacement, see [`MotionOptions::flow_bias_std`].
     pub offset: f64,
 }
 
 impl CommonErrors {
-    /// On the plane or the sphere.
-    pub(crate) fn check(&self, projection: Projection) -> Result<()> {
-        if !(0.0..=1.0).contains(&self.scale) {
-            return Err(Error::argument("flow_scale_std", "a number from 0 to 1", self.scale));
-        }
-        if !(0.0..=FARTHEST).contains(&self.offset) {
-            return Err(Error::argument("flow_bias_std", format!("a number from 0 to {FARTHEST:e}"), self.offset));
-        }
-        if projection == Projection::Sphere && self.offset > 0.0 {
-            return Err(Error::argument(
-                "flow_bias_std",
-                "0 on the sphere, where no displacement is common",
-                self.offset,
-            ));
-        }
-        Ok(())
-    }
-
     /// What both do to a motion of this covariance; `moved`: what displacements on the plane at distance 1 do
     /// to it, to which `unit` maps flow. Less what is known beforehand of the rotation.
     pub(crate) fn on(
@@ -233,6 +234,3 @@ impl CommonErrors {
         w * w.transpose() * self.scale.powi(2) + moved * moved.transpose() * self.offset.powi(2)
     }
 }
-
-/// The largest displacement: squares of larger ones are no numbers.
-pub(crate) const FARTHEST: f64 = 1e100;

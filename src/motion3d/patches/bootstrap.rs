@@ -12,7 +12,7 @@ use crate::math::random::CounterRng;
 use crate::motion3d::diagnostics::confidence_region::PLAUSIBLE;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
-use crate::motion3d::solver::covariance::{inverse, plugged_in};
+use crate::motion3d::solver::covariance::{inverse, plugged};
 use nalgebra::{Vector3, Vector6};
 use rayon::prelude::*;
 
@@ -61,7 +61,7 @@ fn distance(system: &System, truth: &Motion, weighted: bool) -> f64 {
             return Some((found.motion, inverse(&information)?));
         }
         let here = system.equations(&likeliest, &tangents(&likeliest.u()), None);
-        Some((likeliest, plugged_in(&here.h, &here.p)?.likelihood))
+        Some((likeliest, plugged(&here.h, &here.p)?.likelihood))
     };
     let Some((found, covariance)) = found() else { return f64::INFINITY };
     let along = tangents(&found.u()) * truth.u();

@@ -11,6 +11,7 @@ mod status;
 mod system;
 
 use crate::error::{Error, Result};
+use crate::math::by_chance;
 use crate::math::random::CounterRng;
 use crate::motion3d::bound::{MotionBound, check_truth, not_determined, too_few};
 use crate::motion3d::diagnostics::rotation_only::RotationOnly;
@@ -21,9 +22,8 @@ use crate::motion3d::model::motion::{Motion, Projection};
 use crate::motion3d::model::options::{Method, MotionOptions};
 use crate::motion3d::model::result::{CommonEffect, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use crate::motion3d::model::rows::tangents;
-use crate::motion3d::model::statistics::by_chance;
 use crate::motion3d::model::whitening::floored_covariances;
-use crate::motion3d::solver::covariance::{determined, inverse, plugged_in};
+use crate::motion3d::solver::covariance::{determined, inverse, plugged};
 use crate::motion3d::solver::starts::{apart, evaluate, sample};
 use bootstrap::wider;
 use derotation::{beforehand, settle, turned_patch};
@@ -136,11 +136,15 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
         MotionOptions { robust: true, .. } => return refuse("robust"),
         MotionOptions { weight_depths: Some(_), .. } => return refuse("weight_inv_depth"),
         MotionOptions { rotation_prior: Some(_), .. } => return refuse("rotation_prior"),
-        MotionOptions { points_per_independent_sample: Some(_), .. } => return refuse("points_per_independent_sample"),
-        MotionOptions { correlation_length: Some(_), .. } => return refuse("correlation_length"),
+        MotionOptions { points_per_independent_sample: Some(points), .. } if *points != 1.0 => {
+            return refuse("points_per_independent_sample");
+        }
+        MotionOptions { correlation_length: Some(length), .. } if *length != 0.0 => {
+            return refuse("correlation_length");
+        }
         _ => {}
     }
-    options.common.check(Projection::Plane)?;
+    options.check_common(Projection::Plane)?;
     let covariances = floored_covariances(patches.covariances, 6);
     let patches = AffinePatches { covariances: &covariances, ..*patches };
     Ok(options.threads.check()?.install(|| estimate(&patches, options)))
@@ -154,7 +158,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     }
     if let Some(rotation) = explained_by_rotation(&system) {
-        return turning_report(&system, n, &rotation, &options.common, &to_plane(patches.camera));
+        return turning_report(&system, n, &rotation, &options.common(), &to_plane(patches.camera));
     }
     let rng = CounterRng::new(options.random_state);
     let mut minima = match options.initial {
@@ -168,7 +172,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     };
     let tangent = tangents(&best.u());
     let at_best = system.equations(&best, &tangent, None);
-    let plugged = plugged_in(&at_best.h, &at_best.p);
+    let plugged = plugged(&at_best.h, &at_best.p);
     let wanted = options.method == Method::Efficient || (options.method == Method::Auto && used >= SMOOTHED);
     let improved = if wanted || plugged.is_none() { shrunk(system, &best) } else { None };
     let mut out = MotionEstimate::nothing(n, Status::Ok, 1.0);
@@ -192,7 +196,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     };
     let wider = if plugged.is_some() { wider(system, &motion, &told, out.efficient, rng.stream(2)) } else { 1.0 };
     let displaced = (&system.moved(&motion, &told), &to_plane(patches.camera));
-    let common = |covariance| options.common.on(&covariance, &motion, None, displaced);
+    let common = |covariance| options.common().on(&covariance, &motion, None, displaced);
     out.common = covariance.map_or_else(CommonEffect::default, common);
     covariance = covariance.map(|covariance| covariance * wider + out.common.added());
     let low = plugged.is_none() || wider > NONLINEAR;

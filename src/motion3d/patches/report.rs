@@ -8,7 +8,7 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::model::result::{Alternative, MotionEstimate, Status, axes, nested};
 use crate::motion3d::model::rows::{Matrix5, tangents};
-use crate::motion3d::solver::covariance::{direction_deviation, plugged_in};
+use crate::motion3d::solver::covariance::{direction_deviation, plugged};
 use nalgebra::{Matrix2, Vector3};
 
 /// Fills in the result of a motion; returns whether the patches are one plane that has another motion too.
@@ -28,7 +28,7 @@ pub(crate) fn tell(
         out.rotation_std = std::array::from_fn(|i| covariance[(2 + i, 2 + i)].sqrt());
     }
     let here = system.equations(motion, &tangent, None);
-    if let Some(plugged) = plugged_in(&here.h, &here.p) {
+    if let Some(plugged) = plugged(&here.h, &here.p) {
         out.bound = nested(&plugged.bound);
     }
     let rates = Rates::new(&out.uncertain());

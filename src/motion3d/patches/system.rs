@@ -1,10 +1,10 @@
 //! The equations of whitened patches.
 
+use crate::math::by_chance;
 use crate::motion3d::model::derotation::Derotation;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::result::Moved;
 use crate::motion3d::model::rows::{AffineRows, Matrix5, Vector5, tangents};
-use crate::motion3d::model::statistics::by_chance;
 use crate::motion3d::solver::covariance::inverse;
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, Matrix6, RowVector2, SMatrix, Vector3, Vector6};
 

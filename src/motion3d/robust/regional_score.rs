@@ -2,11 +2,11 @@
 //! scene may fit a third motion together with residuals as small as noise, but those of each pull the
 //! estimate another way.
 
+use crate::math::chi2_deviation;
 use crate::motion3d::kernels::{depths, slopes};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
-use crate::motion3d::model::statistics::chi2_deviation;
 use crate::motion3d::solver::neighbours::Tree;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use nalgebra::SymmetricEigen;

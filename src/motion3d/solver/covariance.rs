@@ -1,6 +1,6 @@
 //! Covariances of a motion: maximum likelihood's and the bound.
 
-use crate::motion3d::kernels::{Equations, information};
+use crate::motion3d::kernels::information;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::Matrix5;
@@ -39,16 +39,12 @@ pub(crate) fn determined(information: &Matrix5) -> Option<Matrix5> {
     if least > ROUNDING { inverse(information) } else { None }
 }
 
-/// The covariances that the equations at a minimum give; `None` where noise makes up nearly all of the
+/// The covariances by `H` and the noise `P` of its depths at a minimum; `None` where noise makes up nearly all of the
 /// information.
 ///
 /// `E[H] = M + P`: noisy depths add to the products that the information is made of, so that the usual `H^-1`
 /// lies below the bound.
-pub(crate) fn plugged(equations: &Equations) -> Option<PluginCovariances> {
-    plugged_in(&equations.h, &equations.p)
-}
-
-pub(crate) fn plugged_in(h: &Matrix5, p: &Matrix5) -> Option<PluginCovariances> {
+pub(crate) fn plugged(h: &Matrix5, p: &Matrix5) -> Option<PluginCovariances> {
     let factor = h.cholesky()?.l();
     let whiten = factor.try_inverse()?;
     let noise = whiten * p * whiten.transpose();

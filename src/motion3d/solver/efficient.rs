@@ -117,36 +117,26 @@ pub(crate) fn efficient(
             break;
         }
     }
-    with_covariance(observations, motion, smooth, matches!(weights, WeightDepths::Known(_)).then_some(unit))
+    let (tangent, known) = (tangents(&motion.u()), matches!(weights, WeightDepths::Known(_)));
+    let scaled: Vec<f64>;
+    let nu = if unit == 1.0 {
+        &smooth.nu
+    } else {
+        scaled = smooth.nu.iter().map(|nu| unit * nu).collect();
+        &scaled
+    };
+    let covariance = sandwich(observations, &motion, &tangent, nu, (!known).then_some(&smooth.share[..]))?;
+    Some(Efficient { motion, tangent, covariance, smooth: smooth.nu, variance: (!known).then_some(smooth.variance) })
 }
 
-/// The same without a solution: what the weights say about the covariance at `motion`.
-pub(crate) fn unsolved(
+/// Without a solution: the covariance at `motion` by depths smoothed there.
+pub(crate) fn covariance_at(
     observations: &Observations,
     motion: &Motion,
-    mut weights: WeightDepths<'_>,
-) -> Option<Efficient> {
-    let smooth = weights.at(observations, motion);
-    with_covariance(observations, *motion, smooth, None)
-}
-
-/// `known`: the unit of depths that are known from elsewhere.
-fn with_covariance(
-    observations: &Observations,
-    motion: Motion,
-    smooth: Smoothed,
-    known: Option<f64>,
-) -> Option<Efficient> {
-    let tangent = tangents(&motion.u());
-    let covariance = match known {
-        Some(unit) => {
-            let nu: Vec<f64> = smooth.nu.iter().map(|nu| unit * nu).collect();
-            known_sandwich(observations, &motion, &tangent, &nu)?
-        }
-        None => sandwich(observations, &motion, &tangent, &smooth)?,
-    };
-    let variance = known.is_none().then_some(smooth.variance);
-    Some(Efficient { motion, tangent, covariance, smooth: smooth.nu, variance })
+    smoother: &mut DepthSmoother,
+) -> Option<Matrix5> {
+    let smooth = smoother.smooth(&depths(observations, motion));
+    sandwich(observations, motion, &tangents(&motion.u()), &smooth.nu, Some(&smooth.share))
 }
 
 /// Eigenvalues that the slope may have relative to the weights' squares: beyond, the points' own depths are
@@ -154,49 +144,40 @@ fn with_covariance(
 const SLOPES: std::ops::Range<f64> = 0.25..4.0;
 
 /// The least singular value of the slope relative to the largest at which known depths determine the motion.
-const DETERMINED: f64 = 1e-3;
+const MIN_SLOPE_RATIO: f64 = 1e-3;
 
 /// `A^-1 B A^-t` with `B = sum W^t W` and the slope `A = sum W^t D` of the equation, with its damped weights:
 /// `B^-1` if the weights had the right depths, more where they have not (steps that the smoother rounds off,
 /// depths from elsewhere).
+///
+/// `share`: how much of the points' own depths is in those of the weights. Without it the depths are known
+/// from elsewhere, free of the flow's noise: however wrong they are, only what they leave undetermined is not
+/// known.
 fn sandwich(
     observations: &Observations,
     motion: &Motion,
     tangent: &Matrix2x3<f64>,
-    smooth: &Smoothed,
-) -> Option<Matrix5> {
-    let spread = damping(observations, motion, tangent, &smooth.nu)?;
-    let squares = information(observations, motion, tangent, &smooth.nu, spread);
-    let plain = inverse(&squares)?;
-    let slope = slope(observations, motion, tangent, &smooth.nu, &smooth.share, spread);
-    let whiten = squares.cholesky()?.l().try_inverse()?;
-    let relative = whiten * slope * whiten.transpose();
-    let sizes = SymmetricEigen::new(0.5 * (relative + relative.transpose())).eigenvalues;
-    if !sizes.iter().all(|size| SLOPES.contains(size)) {
-        return Some(plain);
-    }
-    let Some(back) = slope.try_inverse() else { return Some(plain) };
-    let covariance = back * squares * back.transpose();
-    Some(0.5 * (covariance + covariance.transpose()))
-}
-
-/// The same for depths from elsewhere, which no noise of the flow is in: however wrong they are, only what
-/// they leave undetermined is not known.
-fn known_sandwich(
-    observations: &Observations,
-    motion: &Motion,
-    tangent: &Matrix2x3<f64>,
     nu: &[f64],
+    share: Option<&[f64]>,
 ) -> Option<Matrix5> {
     let spread = damping(observations, motion, tangent, nu)?;
     let squares = information(observations, motion, tangent, nu, spread);
-    let slope = slope(observations, motion, tangent, nu, &vec![0.0; nu.len()], spread);
+    let plain = inverse(&squares)?;
+    let none = if share.is_none() { vec![0.0; nu.len()] } else { Vec::new() };
+    let slope = slope(observations, motion, tangent, nu, share.unwrap_or(&none), spread);
     let whiten = squares.cholesky()?.l().try_inverse()?;
-    let sizes = (whiten * slope * whiten.transpose()).singular_values();
-    let back = slope.try_inverse().filter(|_| sizes.min() > DETERMINED * sizes.max())?;
-    let covariance = back * squares * back.transpose();
-    let covariance = 0.5 * (covariance + covariance.transpose());
-    covariance.cholesky().map(|_| covariance)
+    let relative = whiten * slope * whiten.transpose();
+    let determined = if share.is_some() {
+        let sizes = SymmetricEigen::new(0.5 * (relative + relative.transpose())).eigenvalues;
+        sizes.iter().all(|size| SLOPES.contains(size))
+    } else {
+        let sizes = relative.singular_values();
+        sizes.min() > MIN_SLOPE_RATIO * sizes.max()
+    };
+    let back = slope.try_inverse().filter(|_| determined);
+    let covariance = back.map(|back| back * squares * back.transpose());
+    let covariance = covariance.map(|covariance| 0.5 * (covariance + covariance.transpose()));
+    if share.is_some() { covariance.or(Some(plain)) } else { covariance.filter(|own| own.cholesky().is_some()) }
 }
 
 /// The root of the equation whose weights are frozen at `start`.

@@ -5,6 +5,7 @@ use super::efficient::{Efficient, WeightDepths, efficient};
 use super::refine::{FEWER, MANY, Minimum, StoppingCriteria, refine};
 use super::smoothing::DepthSmoother;
 use super::starts::{Searched, sample};
+use crate::math::by_chance;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{depths, equations};
 use crate::motion3d::model::motion::Motion;
@@ -12,7 +13,6 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::{MotionOptions, Smoother};
 use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::rows::tangents;
-use crate::motion3d::model::statistics::by_chance;
 use rayon::prelude::*;
 
 /// Minima that are then refined on all points, beside the one with the smoothest depths and the first where

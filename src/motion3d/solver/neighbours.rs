@@ -105,8 +105,8 @@ impl Tree {
         ranges.filter(|places| places.len() >= least).collect()
     }
 
-    /// The `k` nearest of the points at the places `queries`, themselves left out; `k` is less than the number
-    /// of points.
+    /// The `k` nearest of the points at the places `queries`, themselves left out; `k` is less than the
+    /// number of points.
     pub fn nearest(&self, queries: &[u32], k: usize) -> Neighbours {
         let mut places = vec![0u32; queries.len() * k];
         places.par_chunks_mut(BAND * k).zip(queries.par_chunks(BAND)).for_each(|(out, queries)| {

@@ -154,8 +154,8 @@ impl Kernel<f64> for Regress<'_> {
     }
 }
 
-/// Predicts the depth of each of `queries` (places in the tree) from the `k` nearest of its neighbours, itself
-/// left out.
+/// Predicts the depth of each of `queries` (places in the tree) from the `k` nearest of its neighbours,
+/// itself left out.
 ///
 /// Weights `[(1 - (d / h)^3)^2 + 0.001] s^2` with the distance `h` of the `k`-th; `c = sum l_j^2 v_j` of the
 /// smoother's weights `l`.

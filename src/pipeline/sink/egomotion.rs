@@ -8,8 +8,8 @@ use crate::io::npz::NpzWriter;
 use crate::io::{NumberedFiles, cell, write_picture};
 use crate::math::Real;
 use crate::motion3d::{
-    Alternative, FieldOptions, FieldPoints, Flow, Intrinsics, MotionEstimate, MotionOptions, Noise, RotationPrior,
-    Status, contact_map, estimate_motion, field_points, focus_of_expansion,
+    Alternative, FieldMotion, FieldOptions, Intrinsics, MotionEstimate, MotionOptions, RotationPrior, Status,
+    contact_map, estimate_field_motion, focus_of_expansion,
 };
 use crate::types::{AnyFrame, FlowField};
 use std::path::PathBuf;
@@ -95,36 +95,16 @@ impl Egomotion {
         Ok(Self { table, alternatives, plan, written: 0, latest: None })
     }
 
-    /// The motion of these points, with what is known of the rotation beforehand.
-    fn motion(&self, points: &FieldPoints, rotation_prior: Option<RotationPrior>) -> Result<MotionEstimate> {
-        let flow = Flow::Plane { points: &points.points, flow: &points.flow, camera: Some(&self.plan.camera) };
-        let options = MotionOptions {
-            rotation_prior,
-            points_per_independent_sample: Some(points.points_per_independent_sample),
-            correlation_length: Some(points.correlation_length),
-            common: points.common,
-            ..self.plan.motion.clone()
-        };
-        estimate_motion(&flow, &Noise::Covariances(&points.covariances), &options)
-    }
-
-    /// The motion of the scene around the region, where an independently moving object lies in the region.
-    fn scene<T: Real>(&self, field: &FlowField<T>) -> Result<Option<(MotionEstimate, f64)>> {
-        let (Some(object_rotation_std), Some(region)) = (self.plan.object_rotation_std, self.plan.field.region) else {
+    /// The motion of the scene outside of the region, where an independently moving object lies in the region.
+    fn scene<T: Real>(&self, field: &FlowField<T>) -> Result<Option<MotionEstimate>> {
+        let (Some(_), Some(region)) = (self.plan.object_rotation_std, self.plan.field.region) else {
             return Ok(None);
         };
-        let rest = field_points(field, &FieldOptions::default())?.outside(region);
-        Ok(Some((self.motion(&rest, None)?, object_rotation_std)))
+        let around = FieldOptions { excluded: Some(region), ..FieldOptions::default() };
+        Ok(Some(estimate_field_motion(field, &self.plan.camera, &around, &self.plan.motion)?.estimate))
     }
 
-    fn row(
-        &mut self,
-        frame: usize,
-        time: Option<f64>,
-        points: &FieldPoints,
-        found: &MotionEstimate,
-        scene: Option<Status>,
-    ) -> Result<()> {
+    fn row(&mut self, frame: usize, time: Option<f64>, found: &MotionEstimate, scene: Option<Status>) -> Result<()> {
         let motion = &found.motion;
         let focus = focus_of_expansion(motion, &found.tangent, &found.covariance, Some(&self.plan.camera));
         let (at, spread) = focus.unwrap_or(([f64::NAN; 2], [[f64::NAN; 2]; 2]));
@@ -135,7 +115,7 @@ impl Egomotion {
             time.map(cell).unwrap_or_default(),
             found.status.name().to_string(),
             if found.efficient { "efficient" } else { "ml" }.to_string(),
-            points.points.len().to_string(),
+            found.inliers.len().to_string(),
             found.inliers.iter().filter(|&&inlier| inlier).count().to_string(),
         ];
         cells.extend(motion.translation.map(cell));
@@ -168,14 +148,14 @@ impl Egomotion {
     }
 
     /// The frame with its points in the colours of their rates of approach, and the focus of expansion.
-    fn draw<T: Real>(&mut self, step: &Step<'_, T>, points: &FieldPoints, found: &MotionEstimate) -> Result<()> {
+    fn draw<T: Real>(&mut self, step: &Step<'_, T>, motion: &FieldMotion) -> Result<()> {
         let Some(folder) = &self.plan.pictures else { return Ok(()) };
+        let FieldMotion { estimate: found, points, spacing } = motion;
         let mut picture = grey_picture(&AnyFrame::F64(step.frame.map(|value| value.to_f64())));
         let mark = |(k, at): (usize, &[f64; 2])| ContactMark { at: *at, rate: -1.0 / found.time_to_contact[k] };
-        let marks: Vec<ContactMark> =
-            points.points.iter().enumerate().filter(|(k, _)| found.inliers[*k]).map(mark).collect();
+        let marks: Vec<ContactMark> = points.iter().enumerate().filter(|(k, _)| found.inliers[*k]).map(mark).collect();
         let focus = focus_of_expansion(&found.motion, &found.tangent, &found.covariance, Some(&self.plan.camera));
-        draw_contacts(&mut picture, &marks, 0.5 * points.spacing, focus);
+        draw_contacts(&mut picture, &marks, 0.5 * spacing, focus);
         let path = NumberedFiles::create(folder, "egomotion", "png")?.path(step.field.layout.frame_index);
         write_picture(&path, &picture)?;
         self.written += 1;
@@ -214,21 +194,21 @@ fn time_to_contact(rate: f64, deviation: f64) -> (f64, f64) {
 
 impl<T: Real> Sink<T> for Egomotion {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
-        let points = field_points(step.field, &self.plan.field)?;
         let scene = self.scene(step.field)?;
-        let known = scene
+        let rotation_prior = scene
             .as_ref()
-            .and_then(|(scene, object_rotation_std)| RotationPrior::of_scene(scene, *object_rotation_std));
-        let found = self.motion(&points, known)?;
-        let status = scene.map(|(scene, _)| scene.status);
+            .zip(self.plan.object_rotation_std)
+            .and_then(|(scene, std)| RotationPrior::of_scene(scene.motion.rotation, &scene.covariance, std));
+        let options = MotionOptions { rotation_prior, ..self.plan.motion.clone() };
+        let found = estimate_field_motion(step.field, &self.plan.camera, &self.plan.field, &options)?;
         let frame = step.field.layout.frame_index;
-        self.row(frame, step.time, &points, &found, status)?;
-        self.others(frame, step.time, &found)?;
-        if found.status == Status::TooFewPoints {
+        self.row(frame, step.time, &found.estimate, scene.map(|scene| scene.status))?;
+        self.others(frame, step.time, &found.estimate)?;
+        if found.estimate.status == Status::TooFewPoints {
             return Ok(());
         }
-        self.map(step.field, &found)?;
-        self.draw(step, &points, &found)
+        self.map(step.field, &found.estimate)?;
+        self.draw(step, &found)
     }
 
     fn finish(&mut self, ending: Ending) -> Result<()> {

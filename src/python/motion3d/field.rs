@@ -1,15 +1,16 @@
 //! Points of a flow field for 3-D motion, and times to contact all over it.
 
 use super::flow::{motion, spread};
-use super::given::{fixed, square, word};
-use super::options::PLACEMENTS;
-use super::results::matrix;
+use super::given::{camera, fixed, triple, word};
+use super::options::{Options, PLACEMENTS};
+use super::results::{PyEstimate, matrix};
+use crate::error::Error;
 use crate::motion3d::{
-    CommonEffect, FieldOptions, Intrinsics, UncertainMotion, contact_map, field_patches, field_points,
+    CommonEffect, FieldOptions, RotationPrior, UncertainMotion, contact_map, estimate_field_motion, field_points,
 };
 use crate::python::arrays;
 use crate::python::field::{FlowField, Store, each};
-use crate::python::options::{self, Region};
+use crate::python::options::{self, Integer, Region};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -26,7 +27,7 @@ pub fn motion3d_field_points<'py>(
     region: Option<Region>,
 ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, [f64; 5])> {
     single(field)?;
-    let chosen = FieldOptions { spacing, most, region: options::region(region)? };
+    let chosen = FieldOptions { spacing, most, region: options::region(region)?, ..FieldOptions::default() };
     let found = each!(field.store(), packed => {
         let field = field.core(packed, 0);
         py.detach(|| field_points(&field, &chosen))
@@ -46,27 +47,72 @@ pub fn motion3d_field_points<'py>(
     ))
 }
 
+/// Which points of a field are taken, by the keywords of the Python function.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct FieldLayout<'py> {
+    spacing: Option<f64>,
+    max_points: Option<Integer>,
+    region: Option<Region>,
+    patches: Option<Integer>,
+    /// Status, rotation and covariance of the scene around the region.
+    scene: Option<(String, Array<'py>, Array<'py>)>,
+    object_rotation_std: f64,
+}
+
+impl FieldLayout<'_> {
+    /// As the core takes it.
+    fn core(&self) -> PyResult<FieldOptions> {
+        let region = options::region(self.region)?;
+        let most = self.max_points.map(|most| options::count("max_points", most)).transpose()?;
+        let patches = self.patches.map(|side| options::count("patches", side)).transpose()?;
+        Ok(FieldOptions { spacing: self.spacing, region, excluded: None, most, patches })
+    }
+
+    /// The scene's rotation as what is known of the object's, if a scene is given.
+    fn rotation_prior(&self, given: Option<RotationPrior>) -> PyResult<Option<RotationPrior>> {
+        let std = self.object_rotation_std;
+        if !(std.is_finite() && std > 0.0) {
+            return Err(Error::argument("object_rotation_std", "a positive number", std).into());
+        }
+        let Some((status, rotation, covariance)) = &self.scene else { return Ok(given) };
+        let wrong = |name: &'static str, expected: &str, got: String| Err(Error::argument(name, expected, got).into());
+        if self.patches.is_some() {
+            return wrong("scene", "its default with patches", "a motion".into());
+        }
+        if self.region.is_none() {
+            return wrong("scene", "a region, of the object whose motion is estimated", "no region".into());
+        }
+        if given.is_some() {
+            return wrong("rotation_prior", "none with a scene, whose rotation it would be", "both".into());
+        }
+        let prior = RotationPrior::of_scene(triple("scene", rotation)?, &fixed("scene", covariance)?, std);
+        prior.map_or_else(
+            || wrong("scene", "a motion whose rotation is known", format!("status {status}")),
+            |known| Ok(Some(known)),
+        )
+    }
+}
+
 #[pyfunction]
-#[pyo3(name = "_motion3d_field_patches")]
-pub fn motion3d_field_patches<'py>(
+#[pyo3(name = "_motion3d_estimate_field")]
+pub fn motion3d_estimate_field<'py>(
     py: Python<'py>,
     field: &FlowField,
-    size: usize,
-    region: Option<Region>,
-) -> PyResult<(Array<'py>, Array<'py>, Array<'py>, [f64; 2])> {
+    intrinsics: Option<&Array<'py>>,
+    layout: FieldLayout<'py>,
+    options: Options<'py>,
+) -> PyResult<(PyEstimate<'py>, Array<'py>)> {
     single(field)?;
-    let region = options::region(region)?;
+    let wrong = || Error::argument("K", "a camera matrix (3, 3), px, as a field's points are pixels", "None");
+    let camera = camera(intrinsics)?.ok_or_else(wrong)?;
+    let (chosen, mut options) = (layout.core()?, options.core()?);
+    options.rotation_prior = layout.rotation_prior(options.rotation_prior)?;
     let found = each!(field.store(), packed => {
         let field = field.core(packed, 0);
-        py.detach(|| field_patches(&field, size, region))
+        py.detach(|| estimate_field_motion(&field, &camera, &chosen, &options))
     })?;
-    let n = found.points.len();
-    Ok((
-        matrix(py, &found.points)?.into_any(),
-        matrix(py, &found.motion)?.into_any(),
-        arrays::owned(py, &[n, 6, 6], found.covariances)?.into_any(),
-        [found.common.scale, found.common.offset],
-    ))
+    Ok((PyEstimate::new(py, found.estimate)?, matrix(py, &found.points)?.into_any()))
 }
 
 fn single(field: &FlowField) -> PyResult<()> {
@@ -102,12 +148,13 @@ impl PyUncertainMotion<'_> {
 pub fn motion3d_contact_map<'py>(
     py: Python<'py>,
     field: &FlowField,
-    intrinsics: &Array<'py>,
+    intrinsics: Option<&Array<'py>>,
     known: PyUncertainMotion<'py>,
     placement: &str,
 ) -> PyResult<(Array<'py>, Array<'py>, Array<'py>)> {
     single(field)?;
-    let camera = Intrinsics::new(square("K", "", intrinsics)?)?;
+    let wrong = || Error::argument("K", "a camera matrix (3, 3), px", "None");
+    let camera = camera(intrinsics)?.ok_or_else(wrong)?;
     let known = known.core()?;
     let placement = word("placement", placement, &PLACEMENTS)?;
     let found = each!(field.store(), packed => {

@@ -1,9 +1,9 @@
 //! What a motion does to points, and where it leads.
 
-use super::given::{camera, fixed, rows, triple};
-use super::results::{matrix, vector};
+use super::given::{PROJECTIONS, camera, fixed, rows, triple, word};
+use super::results::matrix;
 use crate::error::Error;
-use crate::motion3d::{Motion, RotationPrior, focus_of_expansion};
+use crate::motion3d::{Motion, focus_of_expansion};
 use crate::python::arrays;
 use pyo3::prelude::*;
 
@@ -43,29 +43,6 @@ pub fn motion3d_essential<'py>(py: Python<'py>, translation: &Any<'py>, rotation
     Ok(matrix(py, &motion.essential_matrix())?.into_any())
 }
 
-/// The rotation prior of an object in a scene, and its covariance; `None` where the
-/// scene's is not known.
-#[pyfunction]
-#[pyo3(name = "_motion3d_beside")]
-pub fn motion3d_beside<'py>(
-    py: Python<'py>,
-    rotation: &Any<'py>,
-    tangent: &Any<'py>,
-    covariance: &Any<'py>,
-    object_rotation_std: f64,
-) -> PyResult<Option<(Any<'py>, Any<'py>)>> {
-    if !(object_rotation_std.is_finite() && object_rotation_std > 0.0) {
-        return Err(Error::argument("object_rotation_std", "a positive number", object_rotation_std).into());
-    }
-    let (_, covariance) = spread(tangent, covariance)?;
-    let Some(known) =
-        RotationPrior::from_scene_covariance(triple("scene", rotation)?, &covariance, object_rotation_std)
-    else {
-        return Ok(None);
-    };
-    Ok(Some((vector(py, known.rotation)?.into_any(), matrix(py, &known.covariance)?.into_any())))
-}
-
 #[pyfunction]
 #[pyo3(name = "_motion3d_predict")]
 pub fn motion3d_predict<'py>(
@@ -75,9 +52,13 @@ pub fn motion3d_predict<'py>(
     translation: &Any<'py>,
     rotation: &Any<'py>,
     intrinsics: Option<&Any<'py>>,
-    spherical: bool,
+    projection: &str,
     whole_frame: bool,
 ) -> PyResult<Any<'py>> {
+    let spherical = word("projection", projection, &PROJECTIONS)?;
+    if spherical && whole_frame {
+        return Err(Error::argument("whole_frame", "False on the sphere, whose flow is instantaneous", "True").into());
+    }
     let camera = camera(intrinsics)?;
     let motion = motion(translation, rotation)?;
     let (shape, values) = arrays::doubles("points", points)?;

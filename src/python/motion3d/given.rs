@@ -8,6 +8,9 @@ use pyo3::prelude::*;
 /// An argument as Python gave it.
 type Any<'py> = Bound<'py, PyAny>;
 
+/// Whether a screen is the sphere, by its name.
+pub const PROJECTIONS: [(&str, bool); 2] = [("plane", false), ("sphere", true)];
+
 /// How points are given, by the keywords of the Python functions.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -17,8 +20,15 @@ pub struct Layout<'py> {
     noise_std: Option<f64>,
     cov: Option<Any<'py>>,
     projection: String,
-    /// Whether six numbers a patch are given.
-    pub six: bool,
+}
+
+impl Layout<'_> {
+    fn check(&self) -> PyResult<()> {
+        if self.cov.is_some() && self.noise_std.is_some() {
+            return Err(Error::argument("cov", "either noise_std or cov", "both").into());
+        }
+        Ok(())
+    }
 }
 
 /// Points of a screen with `D` coordinates each.
@@ -85,7 +95,8 @@ pub struct Given {
 impl Given {
     /// Without `flow`, that of points is zero: bounds do not look at it.
     pub fn new(points: &Any<'_>, flow: Option<&Any<'_>>, layout: &Layout<'_>) -> PyResult<Self> {
-        let spherical = word("projection", &layout.projection, &[("plane", false), ("sphere", true)])?;
+        layout.check()?;
+        let spherical = word("projection", &layout.projection, &PROJECTIONS)?;
         let camera = camera(layout.camera.as_ref())?;
         if spherical && camera.is_some() {
             return Err(Error::argument("K", "none, as bearings need no camera", "a matrix").into());
@@ -125,14 +136,24 @@ impl Given {
 fn covariances(layout: &Layout<'_>, count: usize, size: usize) -> PyResult<Option<Vec<f64>>> {
     let Some(given) = &layout.cov else { return Ok(None) };
     let (shape, values) = arrays::doubles("cov", given)?;
-    if layout.noise_std.is_some() {
-        return Err(Error::argument("cov", "either noise_std or cov", "both").into());
-    }
     if shape != [count, size, size] {
         let expected = format!("shape ({count}, {size}, {size})");
         return Err(Error::argument("cov", expected, format!("shape {shape:?}")).into());
     }
     Ok(Some(values))
+}
+
+/// `(u, v, u_x, v_x, u_y, v_y)` of flow (N, 2) and Jacobians (N, 2, 2).
+fn six_numbers(flow: &Any<'_>, slopes: &Any<'_>) -> PyResult<Vec<[f64; 6]>> {
+    let (shape, values) = arrays::doubles("flow", flow)?;
+    let flow: Vec<[f64; 2]> = rows("flow", &shape, &values)?;
+    let (shape, slopes) = arrays::doubles("jacobian", slopes)?;
+    if shape != [flow.len(), 2, 2] {
+        let expected = format!("shape ({}, 2, 2)", flow.len());
+        return Err(Error::argument("jacobian", expected, format!("shape {shape:?}")).into());
+    }
+    let one = |(f, j): (&[f64; 2], &[f64; 4])| [f[0], f[1], j[0], j[2], j[1], j[3]];
+    Ok(flow.iter().zip(slopes.as_chunks::<4>().0).map(one).collect())
 }
 
 /// Patches with six numbers each.
@@ -144,25 +165,22 @@ pub struct GivenPatches {
 }
 
 impl GivenPatches {
-    /// Without `affine`, the numbers are zero: bounds do not look at them.
-    pub fn new(points: &Any<'_>, affine: Option<&Any<'_>>, layout: &Layout<'_>) -> PyResult<Self> {
+    /// Without `affine`, flow and Jacobian, the numbers are zero: bounds do not look at them.
+    pub fn new(points: &Any<'_>, affine: Option<(&Any<'_>, &Any<'_>)>, layout: &Layout<'_>) -> PyResult<Self> {
+        layout.check()?;
         if layout.projection != "plane" {
-            return Err(Error::argument(
-                "projection",
-                "\"plane\", for six numbers a patch",
-                format!("{:?}", layout.projection),
-            )
-            .into());
+            let expected = "\"plane\" with a jacobian, whose numbers are those of the plane";
+            return Err(Error::argument("projection", expected, format!("{:?}", layout.projection)).into());
+        }
+        if layout.noise_std.is_some() {
+            return Err(
+                Error::argument("noise_std", "None with a jacobian, which needs cov (N, 6, 6)", "a number").into()
+            );
         }
         let (shape, values) = arrays::doubles("points", points)?;
         let points: Vec<[f64; 2]> = rows("points", &shape, &values)?;
-        let motion = match affine {
-            Some(affine) => {
-                let (shape, values) = arrays::doubles("flow", affine)?;
-                rows("flow", &shape, &values)?
-            }
-            None => vec![[0.0; 6]; points.len()],
-        };
+        let motion = affine.map(|(flow, slopes)| six_numbers(flow, slopes)).transpose()?;
+        let motion = motion.unwrap_or_else(|| vec![[0.0; 6]; points.len()]);
         let wanted = [points.len(), 6, 6];
         match layout.cov.as_ref().map(|given| arrays::doubles("cov", given)).transpose()? {
             Some((shape, covariances)) if shape == wanted => {

@@ -7,8 +7,8 @@ mod lateral;
 mod options;
 mod results;
 
-pub use field::{motion3d_contact_map, motion3d_field_patches, motion3d_field_points};
-pub use flow::{motion3d_beside, motion3d_essential, motion3d_focus, motion3d_predict};
+pub use field::{motion3d_contact_map, motion3d_estimate_field, motion3d_field_points};
+pub use flow::{motion3d_essential, motion3d_focus, motion3d_predict};
 pub use lateral::{motion3d_lateral, motion3d_lateral_bound};
 
 use crate::motion3d::{Motion, check_motion, estimate_motion, estimate_patch_motion, motion_bound, patch_motion_bound};
@@ -23,12 +23,13 @@ pub fn motion3d_estimate<'py>(
     py: Python<'py>,
     points: &Bound<'py, PyAny>,
     flow: &Bound<'py, PyAny>,
+    jacobian: Option<&Bound<'py, PyAny>>,
     layout: Layout<'py>,
     options: Options<'py>,
 ) -> PyResult<PyEstimate<'py>> {
     let options = options.core()?;
-    if layout.six {
-        let given = GivenPatches::new(points, Some(flow), &layout)?;
+    if let Some(jacobian) = jacobian {
+        let given = GivenPatches::new(points, Some((flow, jacobian)), &layout)?;
         let found = py.detach(|| estimate_patch_motion(&given.patches(), &options))?;
         return PyEstimate::new(py, found);
     }
@@ -45,13 +46,14 @@ pub fn motion3d_bound<'py>(
     inverse_depth: &Bound<'py, PyAny>,
     translation: &Bound<'py, PyAny>,
     rotation: &Bound<'py, PyAny>,
+    jacobian: bool,
     layout: Layout<'py>,
 ) -> PyResult<PyBound<'py>> {
     let (translation, rotation) = (triple("translation", translation)?, triple("rotation", rotation)?);
     check_motion(&translation, &rotation)?;
     let motion = Motion::new(translation, rotation);
     let (shape, depths) = super::arrays::doubles("inv_depth", inverse_depth)?;
-    if layout.six {
+    if jacobian {
         let given = GivenPatches::new(points, None, &layout)?;
         let surfaces: Vec<[f64; 3]> = rows("inv_depth", &shape, &depths)?;
         let bound = py.detach(|| patch_motion_bound(&given.patches(), &motion, &surfaces))?;

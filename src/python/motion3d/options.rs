@@ -2,10 +2,9 @@
 
 use super::given::{square, triple, word};
 use crate::error::Error;
-use crate::motion3d::{CommonErrors, Method, Motion, MotionOptions, Placement, RotationPrior, Smoother};
-use crate::parallel::Threads;
+use crate::motion3d::{Method, Motion, MotionOptions, Placement, RotationPrior, Smoother};
 use crate::python::arrays;
-use crate::python::options::Integer;
+use crate::python::options::{Integer, threads};
 use pyo3::prelude::*;
 
 /// Where a displacement is taken to be the instantaneous flow, by name.
@@ -24,10 +23,10 @@ pub struct Options<'py> {
     initial: Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>,
     points_per_independent_sample: Option<f64>,
     correlation_length: Option<f64>,
-    flow_scale_std: f64,
-    flow_bias_std: f64,
+    flow_scale_std: Option<f64>,
+    flow_bias_std: Option<f64>,
     random_state: Integer,
-    threads: Option<usize>,
+    threads: Option<Integer>,
 }
 
 impl Options<'_> {
@@ -47,9 +46,10 @@ impl Options<'_> {
             rotation_prior: self.rotation_prior()?,
             points_per_independent_sample: self.points_per_independent_sample,
             correlation_length: self.correlation_length,
-            common: CommonErrors { scale: self.flow_scale_std, offset: self.flow_bias_std },
+            flow_scale_std: self.flow_scale_std,
+            flow_bias_std: self.flow_bias_std,
             random_state: u64::try_from(self.random_state.0).map_err(wrong_random_state)?,
-            threads: Threads::new(self.threads)?,
+            threads: threads(self.threads)?,
         })
     }
 

@@ -1,12 +1,13 @@
 //! A flow field cut into windows, each of them one patch with six numbers.
 
-use super::diagnostics::correlated_noise::area;
-use super::field::{measured, within};
-use super::model::camera::Intrinsics;
-use super::model::options::CommonErrors;
-use super::patches::AffinePatches;
+use super::{common_errors, is_within};
 use crate::error::{Error, Result};
 use crate::math::Real;
+use crate::motion3d::diagnostics::correlated_noise::area;
+use crate::motion3d::model::camera::Intrinsics;
+use crate::motion3d::model::input::check_field;
+use crate::motion3d::model::options::CommonErrors;
+use crate::motion3d::patches::AffinePatches;
 use crate::parallel::Threads;
 use crate::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, SamplingGrid, Status};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
@@ -65,7 +66,7 @@ impl FieldPatches {
 /// [`Error::Argument`] naming `field` for one without covariance, without a Jacobian or with a pixel pitch,
 /// and `patches` for a size below 8 px.
 pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<Rect>) -> Result<FieldPatches> {
-    measured(field)?;
+    check_field(field)?;
     if let Some(missing) = MOTION_NAMES.iter().find(|&&name| !field.layout.parameters.iter().any(|own| own == name)) {
         return Err(Error::argument("field", "flow with its Jacobian", format!("a field without {missing}")));
     }
@@ -76,7 +77,7 @@ pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<
     let sites = windows.pixels_of_windows(field, region);
     let fitted: Vec<_> = Threads::default()
         .install(|| sites.par_iter().enumerate().map(|(k, sites)| windows.fit(field, k, sites)).collect());
-    let mut out = FieldPatches { common: crate::motion3d::field::of_field(field), ..FieldPatches::default() };
+    let mut out = FieldPatches { common: common_errors(field), ..FieldPatches::default() };
     for (k, (motion, covariance)) in fitted.into_iter().enumerate().filter_map(|(k, fit)| Some((k, fit?))) {
         out.points.push(windows.middle(k));
         out.motion.push(motion.into());
@@ -129,7 +130,7 @@ impl Windows {
                 continue;
             }
             let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
-            if let Some(window) = self.of((x, y)).filter(|_| within(region, x, y)) {
+            if let Some(window) = self.of((x, y)).filter(|_| is_within(region, x, y)) {
                 out[window].push(site);
             }
         }

@@ -3,7 +3,7 @@
 use super::*;
 use crate::math::random::CounterRng;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
-use crate::motion3d::{Intrinsics, Motion, MotionOptions, Placement, Status as Told, estimate_patch_motion};
+use crate::motion3d::{Intrinsics, Motion, MotionOptions, Placement, Status as MotionStatus, estimate_patch_motion};
 use crate::types::FieldLayout;
 
 const FOCAL: f64 = 500.0;
@@ -187,19 +187,19 @@ fn six_to_twenty_patches_determine_the_motion_and_say_how_surely() {
     let truth = Motion::new([0.6, 0.2, 0.75], [0.002, -0.003, 0.001]);
     let options = MotionOptions { placement: Placement::Start, ..MotionOptions::default() };
     for (size, number, most) in [(60, 20, 0.8), (100, 6, 2.2)] {
-        let (mut told, mut held, mut sum, mut errors) = (0, 0, 0.0, Vec::new());
+        let (mut ok, mut held, mut sum, mut errors) = (0, 0, 0.0, Vec::new());
         for seed in 0..24 {
             let patches = field_patches(&drive(&truth, seed), size, None).unwrap();
             assert_eq!(patches.points.len(), number);
             let found = estimate_patch_motion(&patches.seen_by(&camera()), &options).unwrap();
             errors.push(found.motion.angle_to(&truth).to_degrees());
             let square = squared(&found, &truth);
-            told += u32::from(found.status == Told::Ok);
+            ok += u32::from(found.status == MotionStatus::Ok);
             held += u32::from(square < 11.07);
             sum += square;
         }
         errors.sort_by(f64::total_cmp);
-        assert!(told >= 20 && held >= 22 && errors[12] < most, "{size}: {held} of {told}, {}", errors[12]);
+        assert!(ok >= 20 && held >= 22 && errors[12] < most, "{size}: {held} of {ok}, {}", errors[12]);
         // This noise has no tail, so that the area over which it is one is smaller than the one that is
         // reckoned with.
         let mean = sum / 24.0 / 5.0 * area() / (4.0 * std::f64::consts::PI);

@@ -1,43 +1,28 @@
 //! Points of a flow field that share no window.
 
-use super::model::options::CommonErrors;
+use super::{FieldOptions, common_errors, is_within, measurement};
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::math::{median, quantile};
-use crate::types::{FlowField, Rect, SamplingGrid, Status};
-use nalgebra::{Matrix2, Vector2};
+use crate::motion3d::model::input::check_field;
+use crate::motion3d::model::options::CommonErrors;
+use crate::types::{FlowField, Rect, SamplingGrid};
+use nalgebra::Matrix2;
 
-/// Errors at a distance of this many correlation lengths share no window. On a recorded drive a fifth of
-/// them goes together still (`benchmarks/tables/motion3d_drive.py`), which the motion's covariance sums
-/// (`together`): a residual alone may be judged as if it did not.
+/// Distance in correlation lengths from which on errors share no window. On a recorded drive a fifth of them
+/// is still correlated (`benchmarks/tables/motion3d_drive.py`); the motion's covariance sums that.
 const INDEPENDENT: f64 = 4.0;
 
-/// Default spacing in correlation lengths. Farther apart, fewer points determine the motion less well, and
-/// show outliers less well; closer ones add little.
-const SPACED: f64 = 2.0;
+/// Default spacing in correlation lengths: of farther points there are fewer, closer ones add little.
+const DEFAULT_SPACING: f64 = 2.0;
 
-/// Least spacing, px, where the field does not know how far its errors go together.
+/// Least default spacing, px.
 const MIN_SPACING: f64 = 8.0;
 
-/// Points closer than this many correlation lengths share so much of their errors that neither chance nor
-/// outliers can be judged with them as if they did not, and they would add little.
-const FINEST: f64 = 1.0;
+/// Least spacing in correlation lengths: of closer points neither chance nor outliers can be judged.
+const FINEST_SPACING: f64 = 1.0;
 
 /// Points of a region below which the default grid is made finer.
-const WANTED: usize = 30;
-
-/// Which points of a field are taken.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct FieldOptions {
-    /// Distance of the points along rows and columns, px, not below the correlation length of the field;
-    /// default: 2 correlation lengths, at least 8 px, and less where a region would have fewer than 30
-    /// points.
-    pub spacing: Option<f64>,
-    /// Only points in this rectangle of pixels.
-    pub region: Option<Rect>,
-    /// Most points, of the region if there is one; the grid is made coarser to keep to it. Default: no limit.
-    pub most: Option<usize>,
-}
+const MIN_REGION_POINTS: usize = 30;
 
 /// Points with their flow and its covariance, as [`Flow::Plane`](crate::motion3d::Flow::Plane) and
 /// [`Noise::Covariances`](crate::motion3d::Noise::Covariances) take them.
@@ -63,28 +48,6 @@ pub struct FieldPoints {
     pub spacing: f64,
 }
 
-impl FieldPoints {
-    /// The points outside of a rectangle of pixels.
-    #[must_use]
-    pub fn outside(&self, region: Rect) -> Self {
-        let mut out = Self {
-            spacing: self.spacing,
-            points_per_independent_sample: self.points_per_independent_sample,
-            correlation_length: self.correlation_length,
-            common: self.common,
-            ..Self::default()
-        };
-        for (k, &[x, y]) in self.points.iter().enumerate() {
-            if !within(Some(region), x as usize, y as usize) {
-                out.points.push([x, y]);
-                out.flow.push(self.flow[k]);
-                out.covariances.extend_from_slice(&self.covariances[4 * k..4 * (k + 1)]);
-            }
-        }
-        out
-    }
-}
-
 /// Takes every so manieth valid estimate of a field.
 ///
 /// Windowed estimates share pixels, and where they do their errors go together over the correlation length
@@ -99,8 +62,8 @@ impl FieldPoints {
 /// [`Error::Argument`] for a field without covariance or with a pixel pitch, and for a spacing that is not
 /// positive.
 pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Result<FieldPoints> {
-    measured(field)?;
-    let usual = MIN_SPACING.max(SPACED * field.layout.correlation_length);
+    check_field(field)?;
+    let usual = MIN_SPACING.max(DEFAULT_SPACING * field.layout.correlation_length);
     let spacing = options.spacing.unwrap_or(usual);
     if !(spacing.is_finite() && spacing > 0.0) {
         return Err(Error::argument("spacing", "a positive number", spacing));
@@ -108,7 +71,7 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
     let step = match field.layout.sites {
         SamplingGrid::Grid { stride, .. } => {
             let steps = |px: f64| ((px / stride as f64).ceil() as usize).max(1);
-            let finest = steps(FINEST * field.layout.correlation_length);
+            let finest = steps(FINEST_SPACING * field.layout.correlation_length);
             let mut step = steps(spacing).max(finest);
             if options.spacing.is_none() && options.region.is_some() {
                 step = fine_enough(field, step, finest, options.region);
@@ -123,22 +86,18 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         SamplingGrid::Points(_) => spacing,
     };
     let correlation_length = field.layout.correlation_length;
-    let common = of_field(field);
+    let common = common_errors(field);
     let mut out =
         FieldPoints { points_per_independent_sample, correlation_length, common, spacing, ..FieldPoints::default() };
     for row in (step / 2..field.height).step_by(step) {
         for column in (step / 2..field.width).step_by(step) {
             let site = row * field.width + column;
-            if !field.status[site].is_valid() || field.status[site] == Status::Inconsistent {
-                continue;
-            }
-            let Some(covariance) = field.covariance_at(site) else { continue };
-            let m = field.affine(site).to_array().map(Real::to_f64);
             let (x, y) = field.layout.sites.pixel(column, row);
-            if !within(options.region, x, y) {
+            let excluded = options.excluded.is_some() && is_within(options.excluded, x, y);
+            if excluded || !is_within(options.region, x, y) {
                 continue;
             }
-            let [[uu, uv, ..], [vu, vv, ..], ..] = covariance;
+            let Some((m, [[uu, uv], [vu, vv]])) = measurement(field, site) else { continue };
             // Rounded, that of an edge may be none.
             if Matrix2::new(uu, 0.5 * (uv + vu), 0.5 * (uv + vu), vv).cholesky().is_none() {
                 continue;
@@ -151,18 +110,6 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
     Ok(out)
 }
 
-/// Whether a field says in px, and how surely, what moves.
-pub(crate) fn measured<T>(field: &FlowField<T>) -> Result<()> {
-    if field.covariance.is_none() {
-        return Err(Error::argument("field", "one with a covariance", "one without"));
-    }
-    if field.layout.pixel_pitch != (1.0, 1.0) {
-        let got = format!("the pixel pitch {:?}", field.layout.pixel_pitch);
-        return Err(Error::argument("field", "flow in px", got));
-    }
-    Ok(())
-}
-
 /// Points on the area over which errors are one, at least 1; a list of points is taken to know what it does.
 fn shared_by<T>(field: &FlowField<T>, step: usize) -> f64 {
     let SamplingGrid::Grid { stride, .. } = field.layout.sites else { return 1.0 };
@@ -173,17 +120,12 @@ fn shared_by<T>(field: &FlowField<T>, step: usize) -> f64 {
     (4.0 * std::f64::consts::PI * length * length / (spacing * spacing)).max(1.0)
 }
 
-/// Whether a pixel lies in the region, which is everything where there is none.
-pub(crate) fn within(region: Option<Rect>, x: usize, y: usize) -> bool {
-    region.is_none_or(|r| (r.x..r.x + r.width).contains(&x) && (r.y..r.y + r.height).contains(&y))
-}
-
-/// SamplingGrid of a grid with that step inside the region.
+/// Number of sites of a grid with that step inside the region.
 fn count<T>(field: &FlowField<T>, step: usize, region: Option<Rect>) -> usize {
     let rows = |column: usize| {
         let inside = |row: &usize| {
             let (x, y) = field.layout.sites.pixel(column, *row);
-            within(region, x, y)
+            is_within(region, x, y)
         };
         (step / 2..field.height).step_by(step).filter(inside).count()
     };
@@ -192,7 +134,7 @@ fn count<T>(field: &FlowField<T>, step: usize, region: Option<Rect>) -> usize {
 
 /// The largest step of at most `step` that has points enough in the region, down to `finest`.
 fn fine_enough<T>(field: &FlowField<T>, step: usize, finest: usize, region: Option<Rect>) -> usize {
-    (finest..=step).rev().find(|&step| count(field, step, region) >= WANTED).unwrap_or(finest)
+    (finest..=step).rev().find(|&step| count(field, step, region) >= MIN_REGION_POINTS).unwrap_or(finest)
 }
 
 /// The least step of at least `step` that leaves no more than the most points wanted.
@@ -204,55 +146,10 @@ fn coarse_enough<T>(field: &FlowField<T>, step: usize, options: &FieldOptions) -
     step
 }
 
-/// The displacement's deviation in those of a point: in rendered rooms, by both methods with a field of
-/// windows, in much noise and in little, means of errors over a picture are 0.2 to 0.4 of it
-/// (`benchmarks/tables/motion3d_fields.py --only errors`).
-const SHARE: f64 = 0.4;
-
-/// The share of the points that determine the scale error: others have large covariances for lack of
-/// texture.
-const BEST: f64 = 0.25;
-
-/// About so many sites of a field are used.
-const FIELD_SITES: f64 = 4000.0;
-
-/// Estimated from covariances. The factor: by the whole error of the points that determine it
-/// best. Of each point, its flow and the covariance of that.
-fn common_errors(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> CommonErrors {
-    let (mut squares, mut variances) = (Vec::new(), Vec::new());
-    for (flow, covariance) in points {
-        let square = covariance.cholesky().map(|factor| flow.dot(&factor.solve(&flow)));
-        if let Some(square) = square.filter(|square| square.is_finite()) {
-            squares.push(square);
-            variances.push(0.5 * covariance.trace());
-        }
-    }
-    let square = quantile(&mut squares, 1.0 - BEST).unwrap_or(0.0);
-    // An error has two components. Flow that may be twice as long or none has no scale.
-    let scale = if square > 0.0 { (2.0 / square).sqrt().min(1.0) } else { 1.0 };
-    CommonErrors { scale, offset: SHARE * median(&mut variances).unwrap_or(0.0).sqrt() }
-}
-
-/// Those of a whole field: an object that moves little in the picture does not
-/// determine the scale error of flow.
-pub(crate) fn of_field<T: Real>(field: &FlowField<T>) -> CommonErrors {
-    let step = ((field.len() as f64 / FIELD_SITES).sqrt() as usize).max(1);
-    let sites = (0..field.height)
-        .step_by(step)
-        .flat_map(|row| (0..field.width).step_by(step).map(move |column| row * field.width + column));
-    let measurement = |site: usize| {
-        let valid = field.status[site].is_valid() && field.status[site] != Status::Inconsistent;
-        let covariance = field.covariance_at(site).filter(|_| valid)?;
-        let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
-        Some((Vector2::new(u, v), Matrix2::from_fn(|i, j| covariance[i][j])))
-    };
-    common_errors(sites.filter_map(measurement))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::FieldLayout;
+    use crate::types::{FieldLayout, Status};
 
     fn field() -> FlowField<f32> {
         let layout = FieldLayout {
@@ -312,9 +209,9 @@ mod tests {
         // As many as are wanted in the region, regardless of the rest of the field.
         let few = inside(FieldOptions { region, most: Some(12), ..FieldOptions::default() });
         assert!((9..=12).contains(&few.points.len()), "{}", few.points.len());
-        let rest = inside(FieldOptions::default()).outside(Rect { x: 10, y: 5, width: 40, height: 30 });
+        let rest = inside(FieldOptions { excluded: region, ..FieldOptions::default() });
         assert_eq!((rest.points.len(), rest.flow.len(), rest.covariances.len()), (12, 12, 48));
-        assert!(rest.points.iter().all(|&[x, y]| !within(region, x as usize, y as usize)));
+        assert!(rest.points.iter().all(|&[x, y]| !is_within(region, x as usize, y as usize)));
         // A given spacing stays.
         let given = inside(FieldOptions { region, spacing: Some(10.0), ..FieldOptions::default() });
         assert_eq!((given.spacing, given.points.len()), (10.0, 12));
@@ -326,15 +223,5 @@ mod tests {
         assert!(field_points(&bare, &FieldOptions::default()).unwrap_err().to_string().starts_with("field: "));
         let wrong = FieldOptions { spacing: Some(0.0), ..FieldOptions::default() };
         assert!(field_points(&field(), &wrong).unwrap_err().to_string().starts_with("spacing: "));
-    }
-
-    #[test]
-    fn both_are_estimated_from_points() {
-        let point = |length: f64| (Vector2::new(length, 0.0), Matrix2::identity() * 0.04);
-        let common = common_errors([1.0, 4.0, 9.0].into_iter().map(point));
-        // A flow of 45 deviations, and one point's of 0.2.
-        assert!((common.scale - (2.0f64 / 2025.0).sqrt()).abs() < 1e-12, "{common:?}");
-        assert!((common.offset - SHARE * 0.2).abs() < 1e-12, "{common:?}");
-        assert_eq!(common_errors(std::iter::empty()).scale, 1.0);
     }
 }
