@@ -138,7 +138,9 @@ def summary(given: list[float | None]) -> dict[str, float | str]:
     }
 
 
-def spacings(data: Path, spacings: Sequence[int] = SPACINGS) -> list[Row]:
+def spacings(
+    data: Path, spacings: Sequence[int] = SPACINGS, presets: Sequence[str] = ("fast", "balanced")
+) -> list[Row]:
     """Whether motions of two halves of the image differ by what both covariances say, for dense and sparse
     points.
 
@@ -148,7 +150,7 @@ def spacings(data: Path, spacings: Sequence[int] = SPACINGS) -> list[Row]:
     """
     images, _ = drive(data)
     rows: list[Row] = []
-    for preset in ("fast", "balanced"):
+    for preset in presets:
         fields = [field(*images[index : index + 2], preset) for index in range(len(images) - 1)]
         length = fields[0].correlation_length
         for spacing in spacings:

@@ -1,6 +1,6 @@
 //! Experiment design: what a layout of points, a field of view and a noise allow.
 
-use super::kernels::{equations, information};
+use super::kernels::{equations, information, slopes};
 use super::model::input::{Flow, Noise, Placement};
 use super::model::motion::Motion;
 use super::model::observations::Observations;
@@ -10,7 +10,7 @@ use super::model::whitening::Whitening;
 use super::solver::covariance::{determined, direction_deviation};
 use crate::error::{Error, Result, numbers};
 use crate::parallel::Threads;
-use nalgebra::{Matrix2x3, Vector2};
+use nalgebra::Matrix2x3;
 
 /// Least number of points for a motion.
 const MIN_POINTS: usize = 5;
@@ -139,20 +139,44 @@ fn weighted_noise(
     nu: &[f64],
     bound: &Matrix5,
 ) -> Matrix5 {
-    let (mut sum, u) = (Matrix5::zeros(), motion.u());
+    let mut sum = Matrix5::zeros();
     for k in 0..observations.n {
-        let row = observations.row(k);
-        let t = row.g * u;
-        let s2 = t.norm_squared();
+        let s2 = (observations.row(k).g * motion.u()).norm_squared();
         if s2 <= observations.floor {
             continue;
         }
-        let p = Vector2::new(t.y, -t.x) / s2.sqrt();
-        let (along, turn) = (tangent * row.g.transpose() * p, row.r.transpose() * p);
-        let d = Vector5::from_column_slice(&[nu[k] * along.x, nu[k] * along.y, turn.x, turn.y, turn.z]);
-        let weight = (d.transpose() * bound * d)[0] / s2;
+        let far = slopes(observations, motion, tangent, 1.0, k);
+        let along = far.fixed_rows::<2>(0).into_owned();
+        let d = Vector5::new(nu[k] * along.x, nu[k] * along.y, far[2], far[3], far[4]);
         let mut block = sum.fixed_view_mut::<2, 2>(0, 0);
-        block += weight * along * along.transpose();
+        block += along * along.transpose() * (d.dot(&(bound * d)) / s2);
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::motion3d::lateral_bound;
+
+    /// The direction lies in the image plane once the other unknowns are taken out.
+    #[test]
+    fn the_closed_forms_of_one_unknown_are_the_general_ones() {
+        let depths: Vec<f64> = (0..101).map(|k| 0.5 + f64::from(k) / 100.0).collect();
+        let bound = lateral_bound(&depths, 0.3).unwrap();
+        let at = vec![[0.0; 2]; 101];
+        let flow = Flow::Plane { points: &at, flow: &at, camera: None };
+        let observations = Whitening::new(&flow, &Noise::StandardDeviation(0.3), Placement::Start).whitened();
+        let motion = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
+        let tangent = tangents(&motion.u());
+        let mut nu = depths.clone();
+        nu.resize(observations.stride, 0.0);
+        let m = information(&observations, &motion, &tangent, &nu, 0.0);
+        let p = equations(&observations, &motion, &tangent, None).p;
+        // The axis that lies in the plane is y; the other is z, along which nothing is seen at the centre.
+        let axis = usize::from(tangent[(1, 1)].abs() > 0.5);
+        let (m, p) = (m[(axis, axis)], p[(axis, axis)]);
+        assert!((1.0 / m - bound.bound).abs() < 1e-12, "{m}");
+        assert!((1.0 / m + p / (m * m) - bound.likelihood).abs() < 1e-12, "{m} {p}");
+    }
 }

@@ -21,14 +21,13 @@ const MIN_POINTS: usize = 5;
 ///
 /// Maximum likelihood by a search over all directions, then the estimating equation with smoothed weights
 /// (see the module). Units: with a camera flow is in px/frame and `noise_std` in px. Rows that are not finite
-/// are left out and come back as NaN. Degenerate scenes are reported in
-/// [`MotionEstimate::status`], not as errors. Everything is computed in double precision.
+/// are left out and come back as NaN. Degenerate scenes are reported in [`MotionEstimate::status`], not as
+/// errors. Everything is computed in double precision.
 ///
 /// # Errors
 /// [`Argument`](crate::error::Error::Argument) naming what has the wrong length or value: `flow`,
-/// `noise_std`,
-/// `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`, `points_per_independent_sample`,
-/// `correlation_length`.
+/// `noise_std`, `cov`, `points`, `weight_inv_depth`, `rotation_prior`, `initial`,
+/// `points_per_independent_sample`, `correlation_length`.
 pub fn estimate_motion(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     flow.check(noise)?;
     options.check(flow, noise)?;
@@ -56,8 +55,8 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     scaled.observations.independent =
         alone(options.points_per_independent_sample, 1.0) && alone(options.correlation_length, 0.0);
     if unknown && options.rotation_prior.is_some() {
-        // What is known beforehand weighs nothing beside flow of no noise, and it does not determine
-        // how large that is.
+        // What is known beforehand weighs nothing beside flow of no noise, and it does not determine how
+        // large that is.
         let alone = estimate(flow, noise, &MotionOptions { rotation_prior: None, ..options.clone() });
         scaled.take(alone.noise_std);
         scaled.may_turn = alone.status == Status::RotationOnly;

@@ -13,19 +13,17 @@
 //! sigma^2)`, `tau^2` the scatter of the depths, for shrunk ones. The variance is `sigma^2 (mean^2 + a^2
 //! (tau^2 + sigma^2)) / (n (mean^2 + a tau^2)^2)`, which is (29), (31) and the least of all `a`.
 
+use super::model::input::check_noise_std;
 use crate::error::{Error, Result};
 use nalgebra::{Matrix2, Vector2};
 
-/// Times that the scatter of depths is computed along the direction found with the one before: it converges
-/// at
-/// once unless noise hides it.
+/// Times that the scatter of depths is computed along the direction found with the one before.
 const ROUNDS: usize = 8;
 
 /// What the flow across the direction is weighed with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum LateralWeights {
-    /// Depths drawn to their mean by what noise leaves of their scatter: never worse than either of the
-    /// others.
+    /// Depths shrunk to their mean by what noise leaves of their scatter: never worse than the others.
     #[default]
     Shrunk,
     /// Each point's own depth: maximum likelihood (28), the principal axis of `sum f f^t`.
@@ -68,13 +66,11 @@ pub struct LateralEstimate {
     pub inverse_depth: Vec<f64>,
 }
 
-/// First two moments of inverse depths.
+/// First two moments of inverse depths: number, square of the mean, scatter `tau^2` about the mean.
 #[derive(Debug, Clone, Copy)]
 struct Moments {
     n: f64,
-    /// Square of the mean.
     squared_mean: f64,
-    /// Scatter about the mean, `tau^2`.
     scatter: f64,
 }
 
@@ -96,14 +92,12 @@ impl Moments {
         match weights {
             LateralWeights::Likelihood => 1.0,
             LateralWeights::Ones => 0.0,
-            // Depths without any scatter are their mean.
             LateralWeights::Shrunk if self.scatter == 0.0 => 0.0,
             LateralWeights::Shrunk => self.scatter / (self.scatter + noise),
         }
     }
 
-    /// Variance of the angle with weights of the share `a`, in noise of the variance `noise`; infinite where
-    /// they see nothing.
+    /// Variance of the angle with weights of the share `a`, in noise of the variance `noise`.
     fn variance(&self, a: f64, noise: f64) -> f64 {
         let slope = self.squared_mean + a * self.scatter;
         if slope == 0.0 {
@@ -117,20 +111,18 @@ impl Moments {
     }
 }
 
-/// Sums over the flow, of which all estimates are made.
+/// Sums over the flow: `n`, `sum f`, `sum f f^t`.
 #[derive(Debug, Clone, Copy)]
 struct Sums {
     n: f64,
-    /// `sum f`.
     first: Vector2<f64>,
-    /// `sum f f^t`.
     second: Matrix2<f64>,
 }
 
 impl Sums {
     fn of(flow: &[[f64; 2]]) -> Self {
         let (mut n, mut first, mut second) = (0.0, Vector2::zeros(), Matrix2::zeros());
-        for &f in flow.iter().filter(|f| finite(f)) {
+        for &f in flow.iter().filter(|f| is_finite(f)) {
             let f = Vector2::from(f);
             n += 1.0;
             first += f;
@@ -144,7 +136,7 @@ impl Sums {
         self.second - self.first * self.first.transpose() / self.n
     }
 
-    /// The principal axis of `Q`, either way.
+    /// The principal axis of `Q`, of either sign.
     fn axis(&self, a: f64) -> Vector2<f64> {
         let q = self.second - (1.0 - a) * self.about_mean();
         let angle = 0.5 * (q[(0, 1)] + q[(1, 0)]).atan2(q[(0, 0)] - q[(1, 1)]);
@@ -165,22 +157,14 @@ impl Sums {
     }
 }
 
-fn finite(flow: &[f64; 2]) -> bool {
+fn is_finite(flow: &[f64; 2]) -> bool {
     flow.iter().all(|value| value.is_finite())
 }
 
-fn check(noise_std: f64) -> Result<()> {
-    // The sums of squares that an estimate is made of are of its fourth power.
-    if noise_std > 0.0 && noise_std.powi(4).is_normal() {
-        return Ok(());
-    }
-    Err(Error::argument("noise_std", "a positive number between 1e-75 and 1e75", noise_std))
-}
-
-/// Which way along an axis: the one that leaves less behind the camera, in squared deviations.
-fn before(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
+/// The sign of an axis that leaves less behind the camera, in squared deviations.
+fn in_front(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
     let (mut plus, mut minus) = (0.0, 0.0);
-    for f in flow.iter().filter(|f| finite(f)) {
+    for f in flow.iter().filter(|f| is_finite(f)) {
         let along = axis.dot(&Vector2::from(*f));
         *(if along < 0.0 { &mut plus } else { &mut minus }) += along * along;
     }
@@ -200,7 +184,7 @@ fn before(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
 /// where `noise_std` is known); [`Error::NotObservable`] when all of the flow, or with weights of 1 its sum,
 /// is zero.
 pub fn estimate_lateral(flow: &[[f64; 2]], noise_std: Option<f64>, weights: LateralWeights) -> Result<LateralEstimate> {
-    noise_std.map_or(Ok(()), check)?;
+    noise_std.map_or(Ok(()), check_noise_std)?;
     let sums = Sums::of(flow);
     let least = if noise_std.is_some() { 1.0 } else { 2.0 };
     if sums.n < least {
@@ -213,8 +197,8 @@ pub fn estimate_lateral(flow: &[[f64; 2]], noise_std: Option<f64>, weights: Late
     let share = |u: &Vector2<f64>| sums.moments(u, noise(u)).share(weights, noise(u));
     let along = match weights {
         LateralWeights::Ones => sums.first,
-        LateralWeights::Likelihood => before(sums.axis(1.0), flow),
-        LateralWeights::Shrunk => before((0..ROUNDS).fold(sums.axis(1.0), |u, _| sums.axis(share(&u))), flow),
+        LateralWeights::Likelihood => in_front(sums.axis(1.0), flow),
+        LateralWeights::Shrunk => in_front((0..ROUNDS).fold(sums.axis(1.0), |u, _| sums.axis(share(&u))), flow),
     };
     if sums.second.trace() == 0.0 || along == Vector2::zeros() {
         return Err(Error::NotObservable("flow that is zero in sum has no direction".into()));
@@ -226,7 +210,7 @@ pub fn estimate_lateral(flow: &[[f64; 2]], noise_std: Option<f64>, weights: Late
         variance: moments.variance(moments.share(weights, noise), noise),
         bound: moments.bound(noise),
         noise_std: noise.sqrt(),
-        inverse_depth: flow.iter().map(|&f| if finite(&f) { u.dot(&Vector2::from(f)) } else { f64::NAN }).collect(),
+        inverse_depth: flow.iter().map(|&f| if is_finite(&f) { u.dot(&Vector2::from(f)) } else { f64::NAN }).collect(),
     })
 }
 
@@ -240,7 +224,7 @@ pub fn estimate_lateral(flow: &[[f64; 2]], noise_std: Option<f64>, weights: Late
 /// [`Error::Argument`] for a `noise_std` that is none, and an `inverse_depth` without a finite value;
 /// [`Error::NotObservable`] when all are zero.
 pub fn lateral_bound(inverse_depth: &[f64], noise_std: f64) -> Result<LateralBound> {
-    check(noise_std)?;
+    check_noise_std(noise_std)?;
     let known: Vec<f64> = inverse_depth.iter().copied().filter(|nu| nu.is_finite()).collect();
     if known.is_empty() {
         return Err(Error::argument("inv_depth", "at least one finite value", "none"));

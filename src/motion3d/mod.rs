@@ -22,7 +22,8 @@
 //!
 //! The data pass `model` (rows of unit noise), `robust` (outliers; it searches with `solver` and `kernels`),
 //! `fit` (minima and weights, by `solver`) and `diagnostics` (covariance, status, report); `estimate` is the
-//! entry point. `patches` does the same for affine flow, `field` takes points or windows of flow fields, `bound` predicts covariances, `lateral` is the closed form without rotation.
+//! entry point. `patches` does the same for affine flow, `field` takes points or windows of flow fields,
+//! `bound` predicts covariances, `lateral` is the closed form without rotation.
 //!
 //! ```
 //! use jacoflow::motion3d::{Flow, Method, Motion, MotionOptions, Noise, Placement, Status, estimate_motion};

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -46,12 +47,16 @@ def number(name: str, value: float) -> float:
 
 
 def whole(name: str, value: int) -> int:
+    """An integer of 64 bits."""
     if isinstance(value, bool | np.bool_):
         raise TypeError(f"{name}: expected an integer, got {value!r}")
     try:
-        return operator.index(value)
+        integer = operator.index(value)
     except TypeError:
         raise TypeError(f"{name}: expected an integer, got {value!r}") from None
+    if abs(integer) > sys.maxsize:
+        raise ValueError(f"{name}: expected an integer of 64 bits, got {integer}")
+    return integer
 
 
 def switch(name: str, value: bool) -> bool:

@@ -29,8 +29,8 @@ pub(crate) struct Equations {
 }
 
 impl Equations {
-    /// What depths behind the camera speak against a motion: the noise of depths near 0 leaves
-    /// `sum (nu^ / sd)^2` of no more than their number.
+    /// What depths behind the camera speak against a motion: the noise of depths near 0 leaves `sum (nu^ /
+    /// sd)^2` of no more than their number.
     pub fn cheirality_cost(&self) -> f64 {
         (self.behind - self.reversed).max(0.0)
     }

@@ -1,8 +1,7 @@
 //! Displacements over a whole frame with its rotation taken out, so that what is left is exact.
 //!
 //! A steady motion `X_dot = u + w x X` takes `X_1` to `X_2 = exp([w]x) X_1 + V u` in one frame. Rotated to
-//! the
-//! camera's orientation half way, `X_1' = exp([w]x / 2) X_1` and `X_2' = exp(-[w]x / 2) X_2`, only a
+//! the camera's orientation half way, `X_1' = exp([w]x / 2) X_1` and `X_2' = exp(-[w]x / 2) X_2`, only a
 //! translation is left:
 //!
 //! ```text

@@ -121,10 +121,7 @@ impl Flow<'_> {
             }
         }
         match noise {
-            // The sums of squares that an estimate is made of are of its fourth power.
-            Noise::StandardDeviation(noise_std) if !(*noise_std > 0.0 && noise_std.powi(4).is_normal()) => {
-                Err(Error::argument("noise_std", "a positive number between 1e-75 and 1e75", noise_std))
-            }
+            Noise::StandardDeviation(noise_std) => check_noise_std(*noise_std),
             Noise::Covariances(c) if c.len() != values * points => {
                 let expected = format!("{points} matrices of {values} values");
                 Err(Error::argument("cov", expected, format!("{} values", c.len())))
@@ -133,6 +130,14 @@ impl Flow<'_> {
             _ => Ok(()),
         }
     }
+}
+
+/// Whether the fourth power of a standard deviation, which sums of squares hold, is a number.
+pub(crate) fn check_noise_std(noise_std: f64) -> Result<()> {
+    if noise_std > 0.0 && noise_std.powi(4).is_normal() {
+        return Ok(());
+    }
+    Err(Error::argument("noise_std", "a positive number between 1e-75 and 1e75", noise_std))
 }
 
 /// Whether a field has covariances and is in px.

@@ -101,8 +101,7 @@ impl Observations {
         self.prior.map_or(0.0, |known| known.pull(w).1)
     }
 
-    /// Usable points in the order given; `source` says where they come from. Their sites are left
-    /// empty.
+    /// Usable points in the order given; `source` says where they come from. Their sites are left empty.
     pub fn new(rows: &[Row], position: Vec<[f64; 3]>, spherical: bool, source: Vec<u32>) -> Self {
         let n = rows.len();
         let stride = n.next_multiple_of(ALIGN);

@@ -29,8 +29,7 @@ pub enum Method {
 ///
 /// In a narrow field a rotation looks like a sideways translation; what is known of it decides between both.
 /// Where flow contradicts it beyond chance the status is [`Ambiguous`](crate::motion3d::Status::Ambiguous);
-/// of a
-/// rotation alone the covariance and the alternative show it.
+/// of a rotation alone the covariance and the alternative show it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotationPrior {
     /// Rotation rate `w`, rad/frame.
@@ -47,9 +46,9 @@ impl RotationPrior {
         known.rotation.iter().chain(known.information.iter()).all(|value| value.is_finite()).then_some(known)
     }
 
-    /// The prior for an object in a scene, from the scene's rotation and the covariance of its `(psi, w)`: the
-    /// object may rotate by itself by `object_rotation_std` (standard deviation about each axis, rad/frame).
-    /// `None` where the scene's rotation is not known.
+    /// The prior for an object in a scene, from the scene's rotation and the covariance of its `(psi, w)`:
+    /// the object may rotate by itself by `object_rotation_std` (standard deviation about each axis,
+    /// rad/frame). `None` where the scene's rotation is not known.
     pub fn of_scene(rotation: [f64; 3], covariance: &[[f64; 5]; 5], object_rotation_std: f64) -> Option<Self> {
         let own = |i, j| if i == j { object_rotation_std * object_rotation_std } else { 0.0 };
         let covariance = std::array::from_fn(|i| std::array::from_fn(|j| covariance[2 + i][2 + j] + own(i, j)));
@@ -78,8 +77,8 @@ pub struct MotionOptions {
     /// What is known of the rotation beforehand; default: nothing.
     pub rotation_prior: Option<RotationPrior>,
     /// How many points share one error, at least 1: the noise given is so many times their own in variance,
-    /// so that together they count once. What is an outlier, and what chance explains, is
-    /// judged by their own. Default: 1.
+    /// so that together they count once. What is an outlier, and what chance explains, is judged by their
+    /// own. Default: 1.
     pub points_per_independent_sample: Option<f64>,
     /// How far errors of neighbours go together, in the unit of the points (px with a camera, rad on the
     /// sphere), as those of windowed flow do: the covariance is then that of the sums over points whose

@@ -11,8 +11,8 @@ pub enum Status {
     /// A motion with its covariance.
     Ok,
     /// Fewer than 12 points (or patches at fewer than 5 places): several motions may explain them exactly.
-    /// Also too few to separate outliers from inliers: in large unknown noise, or where a tenth of
-    /// the inliers are so by chance.
+    /// Also too few to separate outliers from inliers: in large unknown noise, or where a tenth of the
+    /// inliers are so by chance.
     FewPoints,
     /// Fewer than 5 points (or 2 patches): no motion.
     TooFewPoints,
@@ -98,8 +98,8 @@ pub struct MotionEstimate {
     pub inverse_depth_std: Vec<f64>,
     /// `nu~` (N), the depths in the weights; those of maximum likelihood are `nu^`. NaN for points left out.
     pub inverse_depth_smooth: Vec<f64>,
-    /// `(nu, nu_x, nu_y)` in the weights (N), of six numbers a patch; else empty. Slopes are per unit of
-    /// the plane at distance 1.
+    /// `(nu, nu_x, nu_y)` in the weights (N), of six numbers a patch; else empty. Slopes are per unit of the
+    /// plane at distance 1.
     pub surfaces: Vec<[f64; 3]>,
     /// Frames to contact (N), `-1 / (nu~ u_z)`: positive when approaching, infinite where there is no
     /// approach.

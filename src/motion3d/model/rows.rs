@@ -50,25 +50,14 @@ pub(crate) struct AffineRows {
 impl AffineRows {
     /// At `(x, y)` of the plane at distance 1.
     pub fn new([x, y]: [f64; 2]) -> Self {
+        #[rustfmt::skip]
         let rotation = SMatrix::<f64, 6, 3>::from_row_slice(&[
-            -x * y,
-            1.0 + x * x,
-            -y, //
-            -(1.0 + y * y),
-            x * y,
-            x, //
-            -y,
-            2.0 * x,
-            0.0, //
-            0.0,
-            y,
-            1.0, //
-            -x,
-            0.0,
-            -1.0, //
-            -2.0 * y,
-            x,
-            0.0,
+            -x * y, 1.0 + x * x, -y,
+            -(1.0 + y * y), x * y, x,
+            -y, 2.0 * x, 0.0,
+            0.0, y, 1.0,
+            -x, 0.0, -1.0,
+            -2.0 * y, x, 0.0,
         ]);
         Self { point: [x, y], rotation }
     }

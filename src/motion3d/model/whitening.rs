@@ -50,12 +50,12 @@ impl Whitening<'_> {
     /// are left out. Unknown noise is taken to be 1 of the flow's unit.
     pub fn whitened(&self) -> Observations {
         let sources: Vec<u32> = (0..self.flow.len() as u32).collect();
-        let rows = self.rows(&sources);
-        let usable = |(row, at): &(Option<Row>, [f64; 3])| row.is_some() && at.iter().all(|value| value.is_finite());
-        let kept = || rows.iter().zip(&sources).filter(|(row, _)| usable(row));
-        let whitened: Vec<Row> = kept().filter_map(|((row, _), _)| *row).collect();
-        let position = kept().map(|((_, at), _)| *at).collect();
-        let source = kept().map(|(_, source)| *source).collect();
+        let one = |&k: &u32| self.row(k as usize, None);
+        let rows: Vec<_> = sources.par_iter().with_min_len(TOGETHER).map(one).collect();
+        let usable = |(row, at): &(Option<Row>, [f64; 3])| row.filter(|_| at.iter().all(|value| value.is_finite()));
+        let kept = || rows.iter().zip(&sources).filter_map(|(given, source)| Some((usable(given)?, given.1, *source)));
+        let whitened: Vec<Row> = kept().map(|(row, ..)| row).collect();
+        let (position, source) = kept().map(|(_, at, source)| (at, source)).unzip();
         let mut out = Observations::new(&whitened, position, matches!(self.flow, Flow::Sphere { .. }), source);
         out.displaced = self.has_displacements();
         out.site = self.given_positions(&out);
@@ -94,11 +94,6 @@ impl Whitening<'_> {
         out.site.clone_from(&points.site);
         out.turn = Some(turn);
         out
-    }
-
-    /// Whitened points with their places; without a row where they are not usable.
-    fn rows(&self, sources: &[u32]) -> Vec<(Option<Row>, [f64; 3])> {
-        sources.par_iter().with_min_len(TOGETHER).map(|&k| self.row(k as usize, None)).collect()
     }
 
     fn row(&self, k: usize, turn: Option<&Derotation>) -> (Option<Row>, [f64; 3]) {

@@ -39,8 +39,8 @@ pub(crate) fn determined(information: &Matrix5) -> Option<Matrix5> {
     if least > ROUNDING { inverse(information) } else { None }
 }
 
-/// The covariances by `H` and the noise `P` of its depths at a minimum; `None` where noise makes up nearly all of the
-/// information.
+/// The covariances by `H` and the noise `P` of its depths at a minimum; `None` where noise makes up nearly
+/// all of the information.
 ///
 /// `E[H] = M + P`: noisy depths add to the products that the information is made of, so that the usual `H^-1`
 /// lies below the bound.

@@ -2,19 +2,17 @@
 //!
 //! It is that of the information *at the estimate*. Along the direction that is known least, depths, and with
 //! them the information of the points, change: an estimate that is off may seem to know the motion much
-//! better than
-//! one that is right. So the confidence interval of that one unknown is looked for where it ends: where the
-//! estimating equation, with weights smoothed *there* and the other unknowns solved for, is off by as much as
-//! chance makes it in one case of twenty (C. Rao's score test, 1948, which needs the truth of the place only,
-//! not an estimate there). The deviation that has these ends is reported, with the bend of the valley that
-//! they
-//! show, and with what the other unknowns are known to there.
+//! better than one that is right. So the confidence interval of that one unknown is looked for where it ends:
+//! where the estimating equation, with weights smoothed *there* and the other unknowns solved for, is off by
+//! as much as chance makes it in one case of twenty (C. Rao's score test, 1948, which needs the truth of the
+//! place only, not an estimate there). The deviation that has these ends is reported, with the bend of the
+//! valley that they show, and with what the other unknowns are known to there.
 
 use super::covariance::{damping, direction_block, direction_deviation, inverse};
 use crate::motion3d::kernels::{Bilinear, information};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::Matrix5;
+use crate::motion3d::model::rows::{Matrix5, Vector5};
 use nalgebra::{Matrix2x3, Matrix4, SMatrix, SymmetricEigen, Vector2, Vector3};
 
 /// Deviations of the direction, as shares of the field, below which the theory is linear enough; that where
@@ -52,7 +50,6 @@ const KURTOSIS: f64 = 3.0;
 const SIMPSON: f64 = 1.0 / 6.0;
 
 type Vector4 = SMatrix<f64, 4, 1>;
-use crate::motion3d::model::rows::Vector5;
 /// An estimate whose covariance is computed.
 pub(crate) struct ProfileLikelihood<'a> {
     pub observations: &'a Observations,
@@ -100,8 +97,7 @@ impl ProfileLikelihood<'_> {
 
     /// The covariance with what a curved and widening valley adds; the same where the direction is known well
     /// beside the field. `weights`: the depths that weigh the equations at a motion. And whether that
-    /// describes
-    /// the valley: it has ends, and is not so long that a covariance has none of its shape.
+    /// describes the valley: it has ends, and is not so long that a covariance has none of its shape.
     pub fn lengthened(&self, covariance: &Matrix5, mut weights: impl FnMut(&Motion) -> Vec<f64>) -> (Matrix5, bool) {
         let axes = self.bent(covariance);
         let (mut out, mut described) = (*covariance, true);

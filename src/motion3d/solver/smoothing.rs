@@ -83,25 +83,20 @@ impl DepthSmoother {
         places.map(|(&i, &at)| Site { at, nu: depths.nu[i as usize], s2: depths.s2[i as usize] }).collect()
     }
 
-    /// The predictor with the least loss on the compared points.
-    fn best(&self, sites: &[Site], which: Smoother) -> Fitted {
+    /// The predictor with the least loss on the compared points, and these.
+    fn best(&self, sites: &[Site], which: Smoother) -> (Fitted, Vec<Site>) {
         let compared: Vec<Site> = self.compared.iter().map(|&place| sites[place as usize]).collect();
-        let mut best: Option<Fitted> = None;
-        let mut offer = |fitted: Fitted| {
-            if best.as_ref().is_none_or(|best| fitted.loss < best.loss) {
-                best = Some(fitted);
-            }
-        };
-        if which != Smoother::Neighbours || self.lists.k == 0 {
-            offer(Self::prior(sites, &compared));
-        }
-        for k in SIZES.into_iter().filter(|&k| k <= self.lists.k && which != Smoother::Prior) {
+        let is_prior_allowed = which != Smoother::Neighbours || self.lists.k == 0;
+        let prior = is_prior_allowed.then(|| Self::prior(sites, &compared));
+        let regressions = SIZES.into_iter().filter(|&k| k <= self.lists.k && which != Smoother::Prior).map(|k| {
             let prediction = regress(sites, &self.compared, &self.lists, k, self.spherical, self.level);
             let excess = excess_variance(&compared, &prediction);
             let loss = loss(&compared, &prediction, excess, 0.0);
-            offer(Fitted { kind: Kind::Nearest(k), prediction, excess, loss });
-        }
-        best.expect("one predictor at least was offered")
+            Fitted { kind: Kind::Nearest(k), prediction, excess, loss }
+        });
+        let better = |best: Fitted, other: Fitted| if other.loss < best.loss { other } else { best };
+        let best = prior.into_iter().chain(regressions).reduce(better);
+        (best.expect("at least one predictor is allowed"), compared)
     }
 
     /// One normal prior: mean with weights `1 / (v + t2)`, `t2` the scatter beyond the noise.
@@ -137,15 +132,14 @@ impl DepthSmoother {
     /// tot, 25)]`. Always uses the better predictor.
     pub fn cost(&self, depths: &Depths) -> f64 {
         let sites = self.depth_sites(depths);
-        let fitted = self.best(&sites, Smoother::Auto);
-        let compared: Vec<Site> = self.compared.iter().map(|&place| sites[place as usize]).collect();
+        let (fitted, compared) = self.best(&sites, Smoother::Auto);
         loss(&compared, &fitted.prediction, fitted.excess, 1.0) * sites.len() as f64
     }
 
     /// The posterior means `nu~ = q + (t2 + c) / tot (nu^ - q)` of all depths; as long as the planes.
     pub fn smooth(&mut self, depths: &Depths) -> Smoothed {
         let sites = self.depth_sites(depths);
-        let Fitted { kind, prediction, excess, .. } = self.best(&sites, self.which);
+        let (Fitted { kind, prediction, excess, .. }, _) = self.best(&sites, self.which);
         let all = match kind {
             Kind::Prior => {
                 let mean = prediction.q.first().copied().unwrap_or(0.0);

@@ -1,9 +1,9 @@
 //! Estimates against the truth and against what their covariances promise.
 
 use super::scenes::{Held, Scene, W, oblique, smooth};
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
-use crate::parallel::Threads;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
+use jacoflow::parallel::Threads;
 use nalgebra::Vector3;
 
 fn options(method: Method) -> MotionOptions {

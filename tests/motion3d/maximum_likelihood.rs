@@ -1,8 +1,8 @@
 //! Maximum likelihood requested by name: as doubtful as the smoothed weights, and honest about what it lacks.
 
 use super::scenes::{Held, Scene, W, ground, oblique, smooth};
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 
 /// Two minima of one scene are as hard to separate for maximum likelihood as they are for the smoothed
 /// weights.

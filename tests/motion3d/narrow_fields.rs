@@ -1,8 +1,8 @@
 //! Pictures that are narrow beside what is known of the direction, and minima that are narrow in the picture.
 
 use super::scenes::{Held, Scene, ground, mahalanobis, oblique, smooth};
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 
 type Depth<'a> = &'a dyn Fn(f64, f64, f64) -> f64;
 

@@ -1,7 +1,7 @@
 //! Section 5 of the paper: variances by theory against those of many trials, signs, errors.
 
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 
 const ALL: [LateralWeights; 3] = [LateralWeights::Likelihood, LateralWeights::Ones, LateralWeights::Shrunk];
 

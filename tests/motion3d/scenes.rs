@@ -1,11 +1,8 @@
 //! Random scenes with exact truth, and how estimates lie to it.
 
 use crate::math::random::CounterRng;
-use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::{Matrix5, Vector5};
-use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::{Flow, Motion, MotionEstimate, MotionOptions, Noise, Placement, estimate_motion};
-use nalgebra::Vector3;
+use nalgebra::{SMatrix, Vector3};
 
 /// Rotation rate of the published scenes.
 pub(crate) const W: [f64; 3] = [0.02, -0.03, 0.01];
@@ -75,10 +72,6 @@ impl Scene {
         let options = MotionOptions { placement: Placement::Start, ..options.clone() };
         estimate_motion(&self.flow(), &Noise::StandardDeviation(self.noise_std), &options).unwrap()
     }
-
-    pub fn observations(&self) -> Observations {
-        Whitening::new(&self.flow(), &Noise::StandardDeviation(self.noise_std), Placement::Start).whitened()
-    }
 }
 
 /// Squared Mahalanobis distance of the truth from an estimate.
@@ -86,8 +79,8 @@ pub(crate) fn mahalanobis(found: &MotionEstimate, truth: &Motion) -> f64 {
     let to = Vector3::from(truth.translation);
     let along = |a: usize| Vector3::from(found.tangent[a]).dot(&to);
     let w = Vector3::from(truth.rotation) - Vector3::from(found.motion.rotation);
-    let error = Vector5::from_column_slice(&[along(0), along(1), w.x, w.y, w.z]);
-    let covariance = Matrix5::from_fn(|i, j| found.covariance[i][j]);
+    let error = SMatrix::<f64, 5, 1>::from_column_slice(&[along(0), along(1), w.x, w.y, w.z]);
+    let covariance = SMatrix::<f64, 5, 5>::from_fn(|i, j| found.covariance[i][j]);
     (error.transpose() * covariance.try_inverse().unwrap() * error)[0]
 }
 

@@ -1,7 +1,7 @@
 //! Scenes with exactly one right status.
 
 use super::scenes::{Scene, W, oblique, smooth};
-use crate::motion3d::*;
+use jacoflow::motion3d::*;
 
 /// With a known rotation the direction is seen by its smoothed weights, while of a part of these scenes
 /// maximum likelihood's information is less than the depths' noise adds to it: these are `low_snr`, and no

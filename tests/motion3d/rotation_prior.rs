@@ -1,8 +1,8 @@
 //! A rotation known beforehand that the flow speaks against.
 
 use super::scenes::{Held, Scene, oblique, smooth};
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 use nalgebra::Vector3;
 
 /// Deviation of the known rotation, about that of the flow's own.

@@ -1,8 +1,8 @@
 //! Six numbers a patch: what is not known must not be reported as `ok`.
 
 use super::scenes::mahalanobis;
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 
 /// `n` patches in `[-h, h]^2` on the plane at distance 1, seen with a focal length of 500 px: windows of `2 r
 /// + 1` px, noise of `noise_std` px, 3 px of flow in the mean.

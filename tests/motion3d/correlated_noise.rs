@@ -1,8 +1,8 @@
 //! Errors that go together over a distance.
 
 use super::scenes::{ELLIPSOID, mahalanobis};
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 use nalgebra::{DMatrix, DVector};
 
 const SIDE: usize = 14;

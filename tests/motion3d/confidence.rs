@@ -1,7 +1,7 @@
 //! What is not known must not be reported as `ok`: valleys, opposite motions, samples of many points.
 
 use super::scenes::{Scene, W, mahalanobis, oblique, smooth};
-use crate::motion3d::*;
+use jacoflow::motion3d::*;
 
 /// How many estimates are confident (`ok`), and how many of those are off by more than four deviations, with
 /// the truth outside of the ellipsoid that holds 0.999.

@@ -1,8 +1,8 @@
 //! Scenes with an object that moves by itself.
 
 use super::scenes::{Held, Scene, mahalanobis, smooth};
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 
 fn options() -> MotionOptions {
     MotionOptions { robust: true, placement: Placement::Start, ..MotionOptions::default() }

@@ -1,8 +1,8 @@
 //! Outliers that fit by chance, and inliers whose depths look like theirs.
 
 use super::scenes::{Scene, mahalanobis};
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 
 /// A motion by chance, of points with depths from 0.5 to 1.5 of which a share has any flow up to four times
 /// the others'; noise in shares of that.

@@ -1,8 +1,8 @@
 //! Displacements over a whole frame of fast turns.
 
 use super::scenes::{ELLIPSOID, Scene, mahalanobis, oblique};
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 use nalgebra::{Matrix3, Vector3};
 
 /// Directions of rotations, each of length 1.
@@ -79,7 +79,7 @@ impl Views {
 }
 
 fn off(found: &Motion, truth: &Motion) -> f64 {
-    found.angle_to(truth).max((found.w() - truth.w()).norm())
+    found.angle_to(truth).max((Vector3::from(found.rotation) - Vector3::from(truth.rotation)).norm())
 }
 
 #[test]
@@ -159,7 +159,11 @@ fn points_on_a_line_are_given_no_invented_turn() {
             if found.status == Status::Ok {
                 ok += 1;
                 let error = found.motion.angle_to(&truth).to_degrees();
-                assert!(error < 12.0 && (found.motion.w() - truth.w()).norm() < 0.03, "{seed}: {error}");
+                assert!(
+                    error < 12.0
+                        && (Vector3::from(found.motion.rotation) - Vector3::from(truth.rotation)).norm() < 0.03,
+                    "{seed}: {error}"
+                );
             }
         }
         assert!(ok >= 34, "{start}: {ok}");
@@ -199,7 +203,7 @@ fn fast_turns_without_translation_are_told() {
                 for noise in [Noise::StandardDeviation(1e-4), Noise::Unknown] {
                     let found = seen.run(&noise, &MotionOptions { robust, ..MotionOptions::default() });
                     assert_eq!(found.status, Status::RotationOnly, "{turn} {robust} {seed} {noise:?}");
-                    let error = (found.motion.w() - truth.w()).norm();
+                    let error = (Vector3::from(found.motion.rotation) - Vector3::from(truth.rotation)).norm();
                     assert!(error < 5.0 * Vector3::from(found.rotation_std).norm(), "{turn} {robust} {seed}: {error}");
                 }
             }

@@ -1,8 +1,8 @@
 //! Few points with outliers: what a doubtful choice of them leaves must be reported.
 
 use super::scenes::{Scene, mahalanobis};
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 
 fn options() -> MotionOptions {
     MotionOptions { robust: true, placement: Placement::Start, ..MotionOptions::default() }

@@ -1,7 +1,7 @@
 //! Depths that are mostly noise hide the truth behind a lower minimum: that must not be reported as `ok`.
 
 use super::scenes::{Scene, ground, oblique, smooth};
-use crate::motion3d::*;
+use jacoflow::motion3d::*;
 
 /// How many of the estimates are `ok`, and how many of those off by more than four deviations and 15 degrees.
 fn counts(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {

@@ -1,8 +1,8 @@
 //! Every scene that does not determine a motion, by its status.
 
 use super::scenes::{Scene, W};
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 use nalgebra::Vector3;
 
 fn options() -> MotionOptions {

@@ -1,8 +1,29 @@
 //! 3-D motion through the public interface: from frames over a field to motion and depths, six numbers a
 //! patch, promises.
 
-use jacoflow::math::random::CounterRng;
-use jacoflow::motion3d::{
+mod confidence;
+mod correlated_noise;
+mod degenerate;
+mod dense_points;
+mod estimators;
+mod finite_rotation;
+mod lateral;
+mod maximum_likelihood;
+mod moving_objects;
+mod narrow_fields;
+mod noisy_depths;
+mod outlier_posterior;
+mod outliers;
+mod patches;
+mod published;
+mod rotation_prior;
+mod scenes;
+mod statuses;
+
+// The scenes name them by their place in the crate, whose unit tests share them.
+use jacoflow::{math, motion3d};
+use math::random::CounterRng;
+use motion3d::{
     AffinePatches, Flow, Intrinsics, Method, Motion, MotionOptions, Noise, Placement, Status, estimate_motion,
     estimate_patch_motion, focus_of_expansion, motion_bound, patch_motion_bound,
 };

@@ -1,8 +1,8 @@
 //! Points closer than their errors go together.
 
 use super::scenes::{ELLIPSOID, Scene, mahalanobis, smooth};
-use crate::math::random::CounterRng;
-use crate::motion3d::*;
+use jacoflow::math::random::CounterRng;
+use jacoflow::motion3d::*;
 
 /// Points that share one error, and its deviation.
 const SHARED: usize = 12;
