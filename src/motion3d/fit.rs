@@ -253,7 +253,7 @@ impl Task<'_, '_> {
         if let Some(known) = self.known {
             solution.weighted_by_posterior(&scaled.observations, known, self.options.weight_depths.is_some());
         }
-        let common = solution.systematic_effect(inliers, self.whitening.flow, &self.options.common());
+        let common = solution.systematic_effect(inliers, self.whitening.flow, &self.options.systematic_errors());
         let length = self.options.correlation_length.filter(|length| *length > 0.0);
         solution.add_correlation(inliers, self.whitening.flow, length);
         let wider = match (scaled.unknown, self.known) {

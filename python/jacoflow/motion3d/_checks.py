@@ -66,9 +66,9 @@ def switch(name: str, value: bool) -> bool:
     return bool(value)
 
 
-def optional(check: Callable[[str, Any], Any]) -> Callable[[str, Any], Any]:
+def optional(convert: Callable[[str, Any], Any]) -> Callable[[str, Any], Any]:
     """The check of an option that may be None."""
-    return lambda name, value: None if value is None else check(name, value)
+    return lambda name, value: None if value is None else convert(name, value)
 
 
 def layout(K: ArrayLike | None, noise_std: float | None, cov: ArrayLike | None, projection: str) -> dict[str, Any]:

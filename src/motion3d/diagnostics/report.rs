@@ -138,7 +138,7 @@ pub(crate) fn rotation_report(
     if let Some(length) = options.correlation_length.filter(|length| *length > 0.0) {
         covariance = correlated_rotation_covariance(&covariance, inliers, &rotation.rotation, flow, length);
     }
-    let common = options.common().added_to_rotation(&rotation.rotation, &moved);
+    let common = options.systematic_errors().added_to_rotation(&rotation.rotation, &moved);
     if let Some(known) = &inliers.prior
         && let Some((added, alone)) =
             rotation_contradiction(known, &rotation.rotation, &rotation.covariance, &covariance, &common)

@@ -99,7 +99,7 @@ pub struct MotionOptions {
 
 impl MotionOptions {
     /// Errors that all flow has in common.
-    pub(crate) fn common(&self) -> CommonErrors {
+    pub(crate) fn systematic_errors(&self) -> CommonErrors {
         CommonErrors { scale: self.flow_scale_std.unwrap_or(0.0), offset: self.flow_bias_std.unwrap_or(0.0) }
     }
 
@@ -154,7 +154,7 @@ impl MotionOptions {
 
     /// On the plane or the sphere.
     pub(crate) fn check_common(&self, projection: Projection) -> Result<()> {
-        let CommonErrors { scale, offset } = self.common();
+        let CommonErrors { scale, offset } = self.systematic_errors();
         if !(0.0..=1.0).contains(&scale) {
             return Err(Error::argument("flow_scale_std", "a number from 0 to 1", scale));
         }

@@ -158,7 +158,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     }
     if let Some(rotation) = explained_by_rotation(&system) {
-        return turning_report(&system, n, &rotation, &options.common(), &to_plane(patches.camera));
+        return turning_report(&system, n, &rotation, &options.systematic_errors(), &to_plane(patches.camera));
     }
     let rng = CounterRng::new(options.random_state);
     let mut minima = match options.initial {
@@ -196,7 +196,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     };
     let wider = if plugged.is_some() { wider(system, &motion, &told, out.efficient, rng.stream(2)) } else { 1.0 };
     let displaced = (&system.moved(&motion, &told), &to_plane(patches.camera));
-    let common = |covariance| options.common().on(&covariance, &motion, None, displaced);
+    let common = |covariance| options.systematic_errors().on(&covariance, &motion, None, displaced);
     out.common = covariance.map_or_else(CommonEffect::default, common);
     covariance = covariance.map(|covariance| covariance * wider + out.common.added());
     let low = plugged.is_none() || wider > NONLINEAR;

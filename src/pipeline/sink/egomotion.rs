@@ -95,7 +95,8 @@ impl Egomotion {
         Ok(Self { table, alternatives, plan, written: 0, latest: None })
     }
 
-    /// The motion of the scene outside of the region, where an independently moving object lies in the region.
+    /// The motion of the scene outside of the region, where an independently moving object lies in the
+    /// region.
     fn scene<T: Real>(&self, field: &FlowField<T>) -> Result<Option<MotionEstimate>> {
         let (Some(_), Some(region)) = (self.plan.object_rotation_std, self.plan.field.region) else {
             return Ok(None);
