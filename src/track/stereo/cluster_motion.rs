@@ -13,8 +13,6 @@ pub(super) struct PlaneMotion {
     pub centre: [f64; 2],
     /// Truncated mean absolute difference left, grey levels.
     pub residual: f64,
-    /// Deviation of the difference left, from its median, grey levels.
-    pub deviation: f64,
 }
 
 impl PlaneMotion {
@@ -52,7 +50,7 @@ impl ClusterMotion {
     /// A translation of a cluster whose pixels have the middle `centre`.
     pub fn translation([u, v, w]: [f64; 3], centre: [f64; 2]) -> Self {
         let flow = AffineFlow { u, v, ..AffineFlow::default() };
-        Self { plane: PlaneMotion { flow, centre, residual: f64::NAN, deviation: f64::NAN }, depth: w, support: 0.0 }
+        Self { plane: PlaneMotion { flow, centre, residual: f64::NAN }, depth: w, support: 0.0 }
     }
 
     /// Where a point `(x, y, d)` goes.

@@ -2,9 +2,6 @@
 //! weighted.
 
 mod task;
-mod visible;
-
-pub(super) use visible::visible_motion;
 
 use self::task::Task;
 use super::cluster_motion::PlaneMotion;

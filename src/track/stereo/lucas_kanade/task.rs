@@ -8,7 +8,7 @@ use nalgebra::{SMatrix, SVector};
 
 /// A sampled pixel: place about the centre, brightness and gradient.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Voter {
+struct Voter {
     x: f32,
     y: f32,
     value: f32,
@@ -31,10 +31,10 @@ fn truncated_mean(residuals: &[f32]) -> f64 {
 /// Data of one cluster. Maps are `(u, v, u_x, v_x, u_y, v_y)` with derivatives per radius.
 pub(super) struct Task<'a> {
     before: &'a SmoothedLevels,
-    pub(super) after: &'a SmoothedLevels,
+    after: &'a SmoothedLevels,
     pixels: &'a [[f64; 2]],
     centre: [f64; 2],
-    pub(super) radius: f64,
+    radius: f64,
 }
 
 impl<'a> Task<'a> {
@@ -53,16 +53,16 @@ impl<'a> Task<'a> {
     pub(super) fn motion_of(&self, map: &[f64; 6]) -> Option<PlaneMotion> {
         let voters = self.voters(FINE);
         let mut residuals = Vec::with_capacity(voters.len());
-        let deviation = self.residuals(&voters, &self.after.0[FINE], map, &mut residuals)?;
+        self.residuals(&voters, &self.after.0[FINE], map, &mut residuals)?;
         let [u, v, u_x, v_x, u_y, v_y] = *map;
         let r = self.radius;
         let flow = AffineFlow { u, v, u_x: u_x / r, v_x: v_x / r, u_y: u_y / r, v_y: v_y / r };
-        Some(PlaneMotion { flow, centre: self.centre, residual: truncated_mean(&residuals), deviation })
+        Some(PlaneMotion { flow, centre: self.centre, residual: truncated_mean(&residuals) })
     }
 
     /// One Gauss-Newton step of the first `N` unknowns (2: translation, 6: affine) from residuals with a
     /// standard deviation. Returns its length, px.
-    pub(super) fn step<const N: usize>(
+    fn step<const N: usize>(
         &self,
         voters: &[Voter],
         (residuals, deviation): (&[f32], f64),
@@ -124,7 +124,7 @@ impl<'a> Task<'a> {
     }
 
     /// Evenly sampled pixels of a level, without those beside the border or with samples that are not finite.
-    pub(super) fn voters(&self, level: usize) -> Vec<Voter> {
+    fn voters(&self, level: usize) -> Vec<Voter> {
         let frame = &self.before.0[level];
         let (width, height) = frame.size();
         let stride = self.pixels.len().div_ceil(MAX_VOTERS[level]).max(1);
@@ -147,13 +147,7 @@ impl<'a> Task<'a> {
 
     /// Residuals: brightness after the motion less that before, NaN outside. Returns their robust standard
     /// deviation; `None` unless half of the pixels are inside.
-    pub(super) fn residuals(
-        &self,
-        voters: &[Voter],
-        after: &Frame<f32>,
-        map: &[f64; 6],
-        out: &mut Vec<f32>,
-    ) -> Option<f64> {
+    fn residuals(&self, voters: &[Voter], after: &Frame<f32>, map: &[f64; 6], out: &mut Vec<f32>) -> Option<f64> {
         let (width, height) = after.size();
         let (last_x, last_y) = ((width - 1) as f32, (height - 1) as f32);
         let data = after.data();

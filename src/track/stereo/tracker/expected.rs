@@ -5,7 +5,7 @@ use super::super::cluster_motion::middle;
 use super::super::cluster_motion::{ClusterMotion, places};
 use super::super::clusters::Clusters;
 use super::super::lucas_kanade::SmoothedLevels;
-use super::super::measured_motion::{Guess, NextView, measure_motions};
+use super::super::measured_motion::{NextView, measure_motions};
 use super::super::options::MIN_COMPONENT_PIXELS;
 use super::super::overlap::moved_overlaps;
 use super::super::voxels::EdgePoints;
@@ -13,33 +13,26 @@ use super::StereoTracker;
 use crate::mixture::Points;
 
 impl StereoTracker {
-    /// Guesses of the motion of each component: its last one, and that of the component which explains its
-    /// middle best after itself. A new cluster has few pixels, often along one edge, which agree with many
-    /// motions.
-    fn guesses(&self, cell: [f64; 3], components: usize) -> Vec<Guess> {
+    /// A guess of the motion of each component, px: that of the component which explains its middle best after
+    /// itself, probably of the same object. A new cluster has few pixels, often along one edge, which agree
+    /// with many motions.
+    fn guesses(&self, cell: [f64; 3], components: usize) -> Vec<Option<[f64; 2]>> {
         let gap = self.clock.gap;
-        let known: Vec<(usize, [f64; 3])> = (0..components)
+        let known: Vec<(usize, [f64; 2])> = (0..components)
             .filter_map(|k| {
                 let velocity = self.association.live.get(k)?.as_ref()?.velocity?;
                 Some((k, std::array::from_fn(|i| gap * velocity[i] * cell[i])))
             })
             .collect();
-        (0..components)
-            .map(|k| {
-                let last = known.iter().find(|(other, _)| *other == k).map(|(_, velocity)| *velocity);
-                Guess {
-                    last: last.filter(|_| crate::ablation::keeps("stereo.last_start")),
-                    beside: self.beside(k, &known).filter(|_| crate::ablation::keeps("stereo.beside_start")),
-                }
-            })
-            .collect()
+        let guess = |k| self.beside(k, &known).filter(|_| crate::ablation::keeps("stereo.beside_start"));
+        (0..components).map(guess).collect()
     }
 
     /// The motion of that component, of those whose motion is known, which explains the middle of component
     /// `k` best after itself.
-    fn beside(&self, k: usize, known: &[(usize, [f64; 3])]) -> Option<[f64; 3]> {
+    fn beside(&self, k: usize, known: &[(usize, [f64; 2])]) -> Option<[f64; 2]> {
         let posterior = self.posterior.as_ref()?;
-        let others: Vec<(usize, [f64; 3])> = known.iter().copied().filter(|(other, _)| *other != k).collect();
+        let others: Vec<(usize, [f64; 2])> = known.iter().copied().filter(|(other, _)| *other != k).collect();
         if others.is_empty() {
             return None;
         }
