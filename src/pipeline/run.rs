@@ -1,7 +1,7 @@
 //! The loop over frames.
 
 use super::prefetch::Prefetch;
-use super::sink::{Ending, Sink, Step};
+use super::sink::{Sink, Step, end_all, in_place};
 use super::stage::Stage;
 use crate::error::{Error, Result};
 use crate::io::FrameSource;
@@ -116,15 +116,8 @@ impl<T: SimdReal> Pipeline<T> {
     pub fn run(&mut self, source: Box<dyn FrameSource>, progress: &dyn Progress) -> Result<()> {
         let start = Instant::now();
         let worked = self.work(source, progress);
-        let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
-        // Every sink is ended even when an earlier one fails; the first error is returned.
-        let mut result = worked;
-        for sink in &mut self.sinks {
-            result = result.and(sink.finish(ending));
-        }
-        let files: Vec<_> = self.sinks.iter().map(|sink| sink.files()).collect();
-        self.summary.files = files.iter().map(|(number, _)| number).sum();
-        self.summary.latest = files.into_iter().rev().find_map(|(_, latest)| latest);
+        let result = end_all(worked, &mut self.sinks, |sink, ending| sink.finish(ending));
+        (self.summary.files, self.summary.latest) = in_place(self.sinks.iter().map(|sink| sink.files()));
         self.summary.repairs = self.stage.repairs();
         self.summary.seconds = start.elapsed().as_secs_f64();
         result

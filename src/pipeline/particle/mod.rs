@@ -10,8 +10,8 @@ pub use rows::ParticleRows;
 
 use super::prefetch::Prefetch;
 use super::run::{Numbering, check_size};
-use super::sink::Ending;
-use super::track::TrackSummary;
+use super::sink::{Ending, end_all};
+use super::track::{TrackSummary, too_few};
 use crate::error::{Error, Result};
 use crate::io::ColourSource;
 use crate::parallel::Progress;
@@ -112,12 +112,7 @@ impl ParticleRun {
     ) -> Result<()> {
         let start = Instant::now();
         let worked = self.work(source, begin, progress);
-        let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
-        // Every sink is ended even when an earlier one fails; the first error is returned.
-        let mut result = worked;
-        for sink in &mut self.sinks {
-            result = result.and(sink.finish(ending));
-        }
+        let result = end_all(worked, &mut self.sinks, |sink, ending| sink.finish(ending));
         self.summary.note_files(self.sinks.iter().map(|sink| sink.files()).collect());
         self.summary.seconds = start.elapsed().as_secs_f64();
         result
@@ -198,8 +193,4 @@ fn of_target(error: Error, id: u64) -> Error {
         }
         other => other,
     }
-}
-
-fn too_few(frames: usize) -> Error {
-    Error::argument("frames", "at least 2 frames to track through", frames)
 }

@@ -62,6 +62,21 @@ pub trait Sink<T>: Send {
     }
 }
 
+/// Ends every sink, even when an earlier one fails; returns the first error, that of the work included.
+pub(in crate::pipeline) fn end_all<S>(
+    worked: Result<()>,
+    sinks: &mut [S],
+    finish: impl Fn(&mut S, Ending) -> Result<()>,
+) -> Result<()> {
+    let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
+    sinks.iter_mut().fold(worked, |result, sink| result.and(finish(sink, ending)))
+}
+
+/// How many files all sinks have in place, and the last of them.
+pub(in crate::pipeline) fn in_place(files: impl Iterator<Item = (usize, Option<PathBuf>)>) -> (usize, Option<PathBuf>) {
+    files.fold((0, None), |(sum, last), (number, latest)| (sum + number, latest.or(last)))
+}
+
 impl OutputPlan {
     /// The sinks of this plan, whose folder is made; `options` says (in JSON) how the fields are made.
     ///

@@ -13,7 +13,7 @@ pub use rows::{ClusterRows, StereoFormat};
 pub use times::PairTimes;
 
 use super::run::Numbering;
-use super::sink::Ending;
+use super::sink::{Ending, end_all, in_place};
 use crate::error::{Error, Result};
 use crate::parallel::Progress;
 use crate::track::StereoTracker;
@@ -119,15 +119,9 @@ impl StereoRun {
     pub fn run(&mut self, mut pairs: GreyPairs, begin: BeginSinks<'_>, progress: &dyn Progress) -> Result<()> {
         let start = Instant::now();
         let worked = self.work(&mut pairs, begin, progress);
-        let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
-        // Every sink is ended even when an earlier one fails; the first error is returned.
-        let mut result = worked;
-        for sink in &mut self.sinks {
-            result = result.and(sink.finish(ending, self.tracker.graph()));
-        }
-        let files: Vec<_> = self.sinks.iter().map(|sink| sink.files()).collect();
-        self.summary.files = files.iter().map(|(number, _)| number).sum();
-        self.summary.latest = files.into_iter().rev().find_map(|(_, latest)| latest);
+        let graph = self.tracker.graph();
+        let result = end_all(worked, &mut self.sinks, |sink, ending| sink.finish(ending, graph));
+        (self.summary.files, self.summary.latest) = in_place(self.sinks.iter().map(|sink| sink.files()));
         self.summary.tracks = self.tracker.tracks().len();
         self.summary.row_offset = self.tracker.row_offset();
         self.summary.seconds = start.elapsed().as_secs_f64();

@@ -9,7 +9,7 @@ pub use rows::{TrackFormat, TrackRows};
 
 use super::prefetch::Prefetch;
 use super::run::{Numbering, check_size};
-use super::sink::Ending;
+use super::sink::{Ending, end_all};
 use crate::error::{Error, Result};
 use crate::image::Preprocess;
 use crate::io::FrameSource;
@@ -135,12 +135,7 @@ impl TrackRun {
     pub fn run(&mut self, source: Box<dyn FrameSource>, begin: Begin<'_>, progress: &dyn Progress) -> Result<()> {
         let start = Instant::now();
         let worked = self.work(source, begin, progress);
-        let ending = if worked.is_ok() { Ending::Complete } else { Ending::Partial };
-        // Every sink is ended even when an earlier one fails; the first error is returned.
-        let mut result = worked;
-        for sink in &mut self.sinks {
-            result = result.and(sink.finish(ending));
-        }
+        let result = end_all(worked, &mut self.sinks, |sink, ending| sink.finish(ending));
         self.summary.note_files(self.sinks.iter().map(|sink| sink.files()).collect());
         self.summary.seconds = start.elapsed().as_secs_f64();
         result
@@ -221,6 +216,7 @@ impl TrackSummary {
     }
 }
 
-fn too_few(frames: usize) -> Error {
+/// The error of a sequence of fewer than two frames.
+pub(in crate::pipeline) fn too_few(frames: usize) -> Error {
     Error::argument("frames", "at least 2 frames to track through", frames)
 }

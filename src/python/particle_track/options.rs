@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::filter::particle::Resampling;
 use crate::parallel::Threads;
+use crate::python::track::word;
 use crate::segment::SegmentOptions;
 use crate::track::particle::{ForegroundModel, Likelihoods, ParticleMode, ParticleOptions};
 use pyo3::prelude::*;
@@ -24,14 +25,6 @@ pub(super) struct Given {
     grey: String,
     random_state: u64,
     threads: Option<usize>,
-}
-
-/// One of some words.
-fn word<T: Copy>(argument: &'static str, given: &str, known: &[(&str, T)]) -> Result<T> {
-    known.iter().find(|(name, _)| *name == given).map(|(_, value)| *value).ok_or_else(|| {
-        let names: Vec<_> = known.iter().map(|(name, _)| format!("{name:?}")).collect();
-        Error::argument(argument, names.join(", "), format!("{given:?}"))
-    })
 }
 
 impl Given {
