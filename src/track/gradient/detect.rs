@@ -1,6 +1,7 @@
 //! The first object that moves: its box from two frames, where nobody gave one.
 
-use super::noise::noise_of;
+use super::noise::{NOISE_SAMPLES, noise_of};
+use super::shift::half_a_pixel_around;
 use crate::types::{Frame, TargetBox};
 
 /// Change over the noise of a difference that is one.
@@ -53,7 +54,7 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
     if first.size() != second.size() {
         return None;
     }
-    let noise = noise_of(first, second).max(MIN_NOISE);
+    let noise = noise_of(first, second, NOISE_SAMPLES).max(MIN_NOISE);
     let changed = changed(first, second, noise);
     let mut objects = objects(&crowded(&changed));
     objects.retain(|pixels| pixels.len() >= MIN_PIXELS);
@@ -96,7 +97,7 @@ pub(super) fn camera_moved(first: &Frame<f64>, second: &Frame<f64>) -> bool {
     if !crate::ablation::keeps("gradient.detect_camera") {
         return false;
     }
-    let changed = changed(first, second, MIN_NOISE.max(noise_of(first, second).min(MAX_NOISE)));
+    let changed = changed(first, second, MIN_NOISE.max(noise_of(first, second, NOISE_SAMPLES).min(MAX_NOISE)));
     let count = changed.data().iter().filter(|changed| **changed).count();
     count as f64 > MIN_CAMERA_CHANGE * changed.data().len() as f64
 }
@@ -210,21 +211,6 @@ fn displacement(
     let bar = (EQUAL_COST.0 * best).max(EQUAL_COST.1 * noise);
     let alike = all.into_iter().filter(|(cost, _)| *cost <= bar);
     alike.min_by_key(|(_, d)| size(d))
-}
-
-/// Least and greatest brightness within half a pixel along either axis: displacements are whole pixels,
-/// objects do not move by those.
-pub(super) fn half_a_pixel_around(frame: &Frame<f64>) -> Frame<[f64; 2]> {
-    let (width, height) = frame.size();
-    Frame::from_fn(width, height, |x, y| {
-        let own = frame.get(x, y);
-        let columns = [x.saturating_sub(1), (x + 1).min(width - 1)].map(|i| frame.get(i, y));
-        let rows = [y.saturating_sub(1), (y + 1).min(height - 1)].map(|j| frame.get(x, j));
-        columns.into_iter().chain(rows).fold([own; 2], |[low, high], beside| {
-            let half = 0.5 * (own + beside);
-            [low.min(half), high.max(half)]
-        })
-    })
 }
 
 fn read<T: Copy>(frame: &Frame<T>, x: isize, y: isize) -> Option<T> {

@@ -1,4 +1,5 @@
-//! A picture moved by fractions of a pixel, by cubic convolution (R. Keys, 1981).
+//! A picture between its pixels: moved by fractions of one, by cubic convolution (R. Keys, 1981), and the
+//! range of its brightness around each pixel.
 
 use crate::image::Interpolation;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
@@ -107,4 +108,19 @@ impl Taps {
             target.iter_mut().zip(row(k)).for_each(|(t, e)| *t += w * e);
         }
     }
+}
+
+/// Least and greatest brightness within half a pixel along either axis: displacements are whole pixels,
+/// objects do not move by those.
+pub(super) fn half_a_pixel_around(frame: &Frame<f64>) -> Frame<[f64; 2]> {
+    let (width, height) = frame.size();
+    Frame::from_fn(width, height, |x, y| {
+        let own = frame.get(x, y);
+        let columns = [x.saturating_sub(1), (x + 1).min(width - 1)].map(|i| frame.get(i, y));
+        let rows = [y.saturating_sub(1), (y + 1).min(height - 1)].map(|j| frame.get(x, j));
+        columns.into_iter().chain(rows).fold([own; 2], |[low, high], beside| {
+            let half = 0.5 * (own + beside);
+            [low.min(half), high.max(half)]
+        })
+    })
 }

@@ -5,9 +5,8 @@ use super::nearby::nearby;
 use super::patch::smooth;
 use super::samples::{SCATTER_SAMPLES, SCENE_MARGIN, Samples, spread};
 use crate::image::cubic_at;
-use crate::math::robust_std;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
-use crate::track::gradient::noise::median;
+use crate::track::gradient::noise::scatter_of;
 use crate::types::{Frame, TargetBox};
 use std::cell::OnceCell;
 
@@ -96,10 +95,7 @@ pub(super) fn scatter(previous: &Frame<f64>, now: &Frame<f64>, target: TargetBox
         let there = if still { now.get(x, y) } else { cubic_at(now, place[0], place[1]) };
         (still || is_inside(place, now)).then(|| there - previous.get(x, y))
     };
-    let mut changes: Vec<f64> = spread(previous.size(), hidden, SCATTER_SAMPLES).filter_map(change).collect();
-    let middle = median(&mut changes);
-    let mut off: Vec<f64> = changes.iter().map(|change| (change - middle).abs()).collect();
-    robust_std(&mut off).unwrap_or(0.0)
+    scatter_of(spread(previous.size(), hidden, SCATTER_SAMPLES).filter_map(change).collect())
 }
 
 /// Means over squares of `factor` px, then a Gaussian.

@@ -8,7 +8,7 @@
 
 use super::layers::{Target, holds};
 use super::patch::{Bounds, Patch, bounds_about};
-use crate::track::gradient::detect::half_a_pixel_around;
+use crate::track::gradient::shift::half_a_pixel_around;
 use crate::types::{Frame, TargetBox};
 
 /// Frames that are waited for the target to move.

@@ -5,8 +5,8 @@ use super::oriented_box::OrientedBox;
 use super::patch::{dilated, smooth_known};
 use super::score::View;
 use super::state::MIN_NOISE;
-use crate::math::robust_std;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
+use crate::track::gradient::noise::noise_of;
 use crate::types::Frame;
 
 /// Memory of the support.
@@ -149,9 +149,6 @@ impl Kernel<f64> for Behind<'_> {
 /// The noise of the frames, from how the still scene differs from one to the next; grey levels. `noise`: what
 /// it was before, if that is known.
 pub(super) fn learn_noise(noise: Option<f64>, previous: &Frame<f64>, frame: &Frame<f64>) -> f64 {
-    let every = (frame.data().len() / SAMPLES).max(1) | 1;
-    let pairs = frame.data().iter().zip(previous.data()).step_by(every);
-    let mut off: Vec<f64> = pairs.map(|(a, b)| (a - b).abs()).filter(|d| d.is_finite()).collect();
-    let now = robust_std(&mut off).unwrap_or(0.0) / std::f64::consts::SQRT_2;
+    let now = noise_of(previous, frame, SAMPLES);
     noise.map_or(now, |noise| noise + NOISE_RATE * (now - noise)).max(MIN_NOISE)
 }

@@ -1,7 +1,7 @@
 //! Which pixels of the first box are the target's, and which are of an object at rest in front of it.
 
 use super::initial::{Changes, InitialSegmentation};
-use super::patch::smooth_known;
+use super::patch::{smooth_known, wide};
 use crate::math::robust_std;
 use crate::types::Frame;
 use std::cmp::Reverse;
@@ -147,10 +147,9 @@ impl Evidence {
 /// and targets turn and grow.
 fn unlike_all_around(changes: &Changes<'_>, [x, y]: [usize; 2], [i, j]: [usize; 2]) -> f64 {
     let first = &changes.outset.first.frame;
-    let around = |at: usize, length: usize| at.saturating_sub(1)..(at + 2).min(length);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for row in around(y, first.height()) {
-        for value in &first.row(row)[around(x, first.width())] {
+    for row in wide(y, 1, first.height()) {
+        for value in &first.row(row)[wide(x, 1, first.width())] {
             (low, high) = (low.min(*value), high.max(*value));
         }
     }
@@ -195,11 +194,10 @@ impl Appearance {
 fn behind(changes: &Changes<'_>) -> f64 {
     let inside = &changes.outset.inside;
     let (width, height) = inside.size();
-    let near = |at: usize, length: usize| at.saturating_sub(AROUND)..(at + AROUND + 1).min(length);
     let (mut sum, mut count) = (0.0, 0.0);
     for y in 0..height {
         for x in (0..width).filter(|x| !inside.get(*x, y)) {
-            if near(y, height).any(|j| inside.row(j)[near(x, width)].contains(&true)) {
+            if wide(y, AROUND, height).any(|j| inside.row(j)[wide(x, AROUND, width)].contains(&true)) {
                 sum += changes.outset.first.frame.get(x, y);
                 count += 1.0;
             }

@@ -7,8 +7,7 @@ use super::learn;
 use super::light::Light;
 use super::samples::{SCATTER_SAMPLES, SCENE_MARGIN, spread};
 use super::state::{MIN_NOISE, State};
-use crate::math::robust_std;
-use crate::track::gradient::noise::median;
+use crate::track::gradient::noise::scatter_of;
 use crate::track::gradient::options::CameraMotion;
 use crate::types::{Frame, TargetBox};
 
@@ -101,10 +100,5 @@ pub(super) fn shift(state: &mut State, motion: [f64; 2]) {
 /// Contrast of the still scene, grey levels: the deviation of its brightness from the median, robustly.
 fn contrast(frame: &Frame<f64>, target: TargetBox) -> f64 {
     let hidden = grown(target, (0.0, SCENE_MARGIN));
-    let mut off: Vec<f64> = spread(frame.size(), hidden, SCATTER_SAMPLES).map(|(x, y)| frame.get(x, y)).collect();
-    let middle = median(&mut off);
-    for value in &mut off {
-        *value = (*value - middle).abs();
-    }
-    robust_std(&mut off).unwrap_or(0.0)
+    scatter_of(spread(frame.size(), hidden, SCATTER_SAMPLES).map(|(x, y)| frame.get(x, y)).collect())
 }

@@ -4,7 +4,7 @@
 use super::equations::Equations;
 use super::kernels::kernels_of;
 use super::options::LocalFlowOptions;
-use crate::track::gradient::noise::noise_of;
+use crate::track::gradient::noise::{NOISE_SAMPLES, noise_of};
 use crate::track::gradient::shift::shifted;
 use crate::types::Frame;
 
@@ -34,7 +34,7 @@ pub struct MeanFlow {
 impl LocalFlowOptions {
     /// The weakest gradient that counts between these frames.
     pub(super) fn least(&self, first: &Frame<f64>, second: &Frame<f64>) -> f64 {
-        if self.min_sigma > 0.0 { self.min_sigma.max(OVER_NOISE * noise_of(first, second)) } else { 0.0 }
+        if self.min_sigma > 0.0 { self.min_sigma.max(OVER_NOISE * noise_of(first, second, NOISE_SAMPLES)) } else { 0.0 }
     }
 
     /// Flow from the better of two starts (25): none, and a velocity that all pixels may have. One correction
