@@ -25,12 +25,7 @@ use rayon::prelude::*;
 /// Number of points from which on [`Method::Auto`] smooths depths.
 const SMOOTHED: usize = 30;
 
-/// Times that a minimum is chosen again once its own rotation is taken out of displacements.
-const CHOICES: usize = 4;
-
-/// Times that is done where smoothed weights prefer another minimum, and the squared shift, in deviations, by
-/// which a motion is another one than that whose rotation is taken out.
-const AGAIN: usize = 2;
+/// Squared shift, in standard deviations, by which a motion differs from that whose rotation is taken out.
 const MAX_SHIFT: f64 = 1.0;
 
 /// The inliers of one motion with the options of the fit.
@@ -57,7 +52,7 @@ impl Task<'_, '_> {
     /// Estimates on the `inliers` of all points.
     pub fn on(&self, scaled: &mut Scaled, mut inliers: Observations) -> MotionEstimate {
         let flow = self.whitening.flow;
-        let mut found = self.begin(&inliers, scaled.unknown);
+        let mut found = self.begin(&inliers);
         let Some(&first) = found.first() else {
             return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.noise_std);
         };
@@ -74,19 +69,10 @@ impl Task<'_, '_> {
                 .map(|minimum| refine(&inliers, minimum.motion, None, StoppingCriteria::of(inliers.n)))
                 .collect();
         }
-        let (mut candidates, made) = self.chosen(scaled, &mut inliers, found);
+        let (candidates, made) = self.chosen(&inliers, &found);
         let mut solved = self.solved(&inliers, &candidates, made);
-        for round in 0..=AGAIN {
-            if shift(self.whitening, &inliers, &solved.solution.motion) <= MAX_SHIFT {
-                break;
-            }
-            // Undetermined: the points were derotated about a different rotation.
-            if round == AGAIN {
-                solved.described = false;
-                break;
-            }
-            (candidates, solved) = self.solved_there(scaled, &mut inliers, &candidates, &solved.solution.motion);
-        }
+        // Undetermined: the points were derotated about a different rotation.
+        solved.described &= shift(self.whitening, &inliers, &solved.solution.motion) <= MAX_SHIFT;
         self.inflate(&mut solved.solution, scaled, &inliers, candidates[0].minimum.equations.cost);
         solved.undecided = solved.undecided.or_else(|| contested(&candidates, &solved.solution));
         if solved.solution.contradicted(&inliers) {
@@ -106,13 +92,13 @@ impl Task<'_, '_> {
     }
 
     /// The minima of the likelihood.
-    fn begin(&self, inliers: &Observations, unknown: bool) -> Vec<Minimum> {
+    fn begin(&self, inliers: &Observations) -> Vec<Minimum> {
         match (&self.options.initial, self.known) {
             (Some(initial), _) => {
                 let initial = Motion::new(initial.translation, initial.rotation);
                 vec![refine(inliers, initial, None, StoppingCriteria::FULL)]
             }
-            (None, None) => minima(inliers, unknown, self.rng.stream(2)),
+            (None, None) => minima(inliers, self.rng.stream(2)),
             (None, Some(known)) => again(inliers, known),
         }
     }
@@ -147,47 +133,14 @@ impl Task<'_, '_> {
         ))
     }
 
-    /// The minima in the order of preference; the first has its own rotation taken out of the points.
-    fn chosen(
-        &self,
-        scaled: &mut Scaled,
-        inliers: &mut Observations,
-        mut found: Vec<Minimum>,
-    ) -> (Vec<Candidate>, Option<DepthSmoother>) {
-        let (mut candidates, mut made) = self.preferred(inliers, &found);
-        for _ in 0..CHOICES {
-            let lead = candidates[0].minimum;
-            if !matters(self.whitening, inliers, &lead.motion) {
-                return (candidates, made);
-            }
-            settle(self.whitening, &mut scaled.observations, inliers, &mut found, &lead, false);
-            (candidates, made) = self.preferred(inliers, &found);
-        }
-        // Each of two is preferred with the rotation of the other taken out: the one whose own is out now is
-        // returned.
+    /// The minima in the order of preference; the first has its own rotation taken out of the points if any
+    /// has.
+    fn chosen(&self, inliers: &Observations, found: &[Minimum]) -> (Vec<Candidate>, Option<DepthSmoother>) {
+        let (mut candidates, made) = self.preferred(inliers, found);
         if let Some(own) = candidates.iter().position(|other| !matters(self.whitening, inliers, other.motion())) {
             candidates[..=own].rotate_right(1);
         }
         (candidates, made)
-    }
-
-    /// Solves once more with the rotation taken out of the minimum that smoothed weights preferred to the
-    /// first of the `candidates`.
-    fn solved_there(
-        &self,
-        scaled: &mut Scaled,
-        inliers: &mut Observations,
-        candidates: &[Candidate],
-        preferred: &Motion,
-    ) -> (Vec<Candidate>, Solved) {
-        let mut found: Vec<Minimum> = candidates.iter().map(|candidate| candidate.minimum).collect();
-        let away = |minimum: &&Minimum| minimum.motion.angle_to(preferred);
-        if let Some(lead) = found.iter().min_by(|a, b| away(a).total_cmp(&away(b))).copied() {
-            settle(self.whitening, &mut scaled.observations, inliers, &mut found, &lead, false);
-        }
-        let (candidates, made) = self.chosen(scaled, inliers, found);
-        let solved = self.solved(inliers, &candidates, made);
-        (candidates, solved)
     }
 
     fn preferred(&self, inliers: &Observations, found: &[Minimum]) -> (Vec<Candidate>, Option<DepthSmoother>) {
@@ -247,8 +200,8 @@ impl Task<'_, '_> {
         Solved { solution, deviation, low, described, undecided }
     }
 
-    /// Takes into account what a linear theory of independent inliers of known noise leaves out.
-    /// `cost`: what maximum likelihood leaves.
+    /// Takes into account what a linear theory of independent inliers of known noise leaves out. `cost`: what
+    /// maximum likelihood leaves.
     fn inflate(&self, solution: &mut Solution, scaled: &Scaled, inliers: &Observations, cost: f64) {
         if let Some(known) = self.known {
             solution.weighted_by_posterior(&scaled.observations, known, self.options.weight_depths.is_some());
@@ -269,8 +222,8 @@ impl Task<'_, '_> {
 }
 
 /// Another minimum that is preferred with the rotation taken out that belongs to the first, as that is with
-/// its own; or one that is where depths behind the camera count only where noise does not explain them:
-/// of depths near 0, half are behind it.
+/// its own; or one that is where depths behind the camera count only where noise does not explain them: of
+/// depths near 0, half are behind it.
 fn contested(candidates: &[Candidate], solution: &Solution) -> Option<Alternative> {
     let first = &candidates[0];
     let preferred = candidates.get(1).filter(|other| other.cost < first.cost);
@@ -281,9 +234,9 @@ fn contested(candidates: &[Candidate], solution: &Solution) -> Option<Alternativ
     Some(Alternative { motion: *other.motion(), excess: other.cost - first.cost })
 }
 
-/// What residuals are larger by, in variance, than the given noise, where chance does not explain it:
-/// what the model leaves out (larger noise than given, outliers, a minimum that was
-/// missed), the motion is off by as much (R. Birge 1932).
+/// What residuals are larger by, in variance, than the given noise, where chance does not explain it: what
+/// the model leaves out (larger noise than given, outliers, a minimum that was missed), the motion is off by
+/// as much (R. Birge 1932).
 fn misfit(inliers: &Observations, cost: f64) -> f64 {
     let free = inliers.n.saturating_sub(5) as f64 / inliers.points_per_independent_sample;
     if free > 0.0 && !by_chance(cost, free) { cost / free } else { 1.0 }

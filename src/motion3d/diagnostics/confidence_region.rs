@@ -15,12 +15,15 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::Smoother;
 use crate::motion3d::model::rows::tangents;
 use crate::motion3d::model::whitening::Whitening;
-use crate::motion3d::solver::finite_rotation::{WANDERED, afresh};
+use crate::motion3d::solver::finite_rotation::afresh;
 use crate::motion3d::solver::likelihood::minima;
 use crate::motion3d::solver::smoothing::DepthSmoother;
 use crate::motion3d::solver::starts::{at_most, evaluate};
 use nalgebra::Vector3;
 use rayon::prelude::*;
+
+/// How much, rad, a rotation may differ from the one that was taken out before others are examined.
+const MAX_ROTATION_CHANGE: f64 = 0.1;
 
 /// The 0.95 quantile of chi-squared with five degrees of freedom.
 pub(crate) const PLAUSIBLE: f64 = 11.07;
@@ -159,7 +162,7 @@ pub(crate) fn plausible_less_turned(
         return false;
     }
     let Some(fresh) = afresh(whitening, own) else { return false };
-    let wandered = fresh.turn.is_some_and(|turn| (turn.rotation - motion.w()).norm() > WANDERED);
+    let wandered = fresh.turn.is_some_and(|turn| (turn.rotation - motion.w()).norm() > MAX_ROTATION_CHANGE);
     if !wandered {
         return false;
     }
@@ -171,7 +174,7 @@ pub(crate) fn plausible_less_turned(
     asked.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     asked.retain(|asked| apart(asked) && asked.cost < limit(asked));
     asked.truncate(COMPARED);
-    let found = minima(&fresh, true, rng.stream(1));
+    let found = minima(&fresh, rng.stream(1));
     asked.extend(found.iter().filter_map(|minimum| ask(&fresh, &minimum.motion.u(), &u)));
     let exact = asked.into_par_iter().filter_map(|asked| exactly(whitening, &fresh, asked));
     let exact: Vec<(Observations, TestedDirection)> =

@@ -10,7 +10,7 @@ use crate::motion3d::solver::likelihood::minima;
 
 /// Estimates the noise of all points if all are inliers of one motion.
 pub(crate) fn noise_std(observations: &Observations, rng: CounterRng) -> Option<f64> {
-    let best = minima(observations, true, rng.stream(20)).first()?.equations.cost;
+    let best = minima(observations, rng.stream(20)).first()?.equations.cost;
     let degrees = observations.n.saturating_sub(UNKNOWNS).max(1);
     Some((best / degrees as f64).sqrt()).filter(|noise_std| noise_std.is_finite() && *noise_std > 0.0)
 }

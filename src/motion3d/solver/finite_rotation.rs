@@ -3,10 +3,9 @@
 //! Half way between both ends a displacement is the instantaneous flow to second order. The rest, of third
 //! order in rotation and translation, is in no covariance; rows that have the motion's own rotation taken out
 //! of them ([`derotation`](crate::motion3d::model::derotation)) have none. Where the rest would move an
-//! estimate by a small share of
-//! its deviation, nothing is turned.
+//! estimate by a small share of its deviation, nothing is turned.
 
-use super::likelihood::{cost_tolerance, different};
+use super::likelihood::different;
 use super::refine::{Minimum, StoppingCriteria, refine};
 use super::starts::at_most;
 use crate::math::quantile;
@@ -42,15 +41,8 @@ const HIDDEN: f64 = 0.1;
 /// Root mean square of the rest, in units of noise, that changes few inliers.
 const OBEYING: f64 = 0.1;
 
-/// The farthest, degrees, that a minimum may come from itself under another one's rotation.
-const APART: f64 = 12.0;
-
 /// Most times that rows are turned about what they gave.
 const ROUNDS: usize = 6;
-
-/// How much, rad, the rotation of a minimum may differ from the one that was taken out before others are
-/// followed, too.
-pub(crate) const WANDERED: f64 = 0.1;
 
 /// Pairs of points that a first rotation is tried from, the share of the points that decide between them, and
 /// rounds of weights.
@@ -91,8 +83,8 @@ fn half_way_residual(turned: &Observations, motion: &Motion, k: usize) -> f64 {
     if s2 > turned.floor { (t.y * left.x - t.x * left.y) / s2.sqrt() } else { 0.0 }
 }
 
-/// The squared shift of an estimate, in its standard deviations, if the points were derotated
-/// about its rotation: `g^t H^-1 g` of the changes' `g = sum D^t de`.
+/// The squared shift of an estimate, in its standard deviations, if the points were derotated about its
+/// rotation: `g^t H^-1 g` of the changes' `g = sum D^t de`.
 pub(crate) fn shift(whitening: &Whitening<'_>, points: &Observations, motion: &Motion) -> f64 {
     if !points.displaced {
         return 0.0;
@@ -157,8 +149,7 @@ pub(crate) fn beforehand(
 }
 
 /// The points with the rotation taken out that explains most of their flow by itself, regardless of what was
-/// taken out
-/// before; `None` where there is none.
+/// taken out before; `None` where there is none.
 pub(crate) fn afresh(whitening: &Whitening<'_>, points: &Observations) -> Option<Observations> {
     let mut turned = whitening.derotated(points, Derotation::new(&Vector3::zeros()));
     for _ in 0..=TURNS {
@@ -177,12 +168,8 @@ fn rest(points: &Observations, turned: &Observations, w: &Vector3<f64>) -> f64 {
     (0..points.n).map(changed).sum::<f64>() / points.n as f64
 }
 
-/// Turns the inliers about the rotation of `lead`, the minimum that matters, until that stays; then all
+/// Takes the rotation of `lead`, the minimum that matters, out of the inliers until it stays; then out of all
 /// points, and refines `found`. `unknown`: the noise is what the lead leaves.
-///
-/// Far from the rotation that was taken out residuals are only those of a linear model. Where the lead's turn
-/// out to be much larger once its own rotation is taken out, or that is quite another one, the other minima
-/// are followed, too, and only those stay that are as good as the best.
 pub(crate) fn settle(
     whitening: &Whitening<'_>,
     all: &mut Observations,
@@ -191,30 +178,10 @@ pub(crate) fn settle(
     lead: &Minimum,
     unknown: bool,
 ) {
-    let follow = |minimum: &Minimum| follow(whitening, inliers, *minimum, unknown);
+    let (own, Some(turned)) = follow(whitening, inliers, *lead, unknown) else { return };
     let others: Vec<Minimum> = found.iter().filter(|other| other.motion != lead.motion).copied().collect();
-    let own = follow(lead);
-    let limit = |cost: f64| cost + cost_tolerance(inliers.n) * noise(cost, inliers.n, unknown);
-    let before = inliers.turn.map_or_else(Vector3::zeros, |turn| turn.rotation);
-    let stayed = (own.minimum.motion.w() - before).norm() < WANDERED;
-    let (again, turned) = if others.is_empty() || stayed && own.cost <= limit(lead.equations.cost) {
-        let Some(turned) = own.turned else { return };
-        let again = |minimum: &Minimum| refine(&turned, minimum.motion, None, StoppingCriteria::ROUGH);
-        let again = different(others.par_iter().map(again).chain([own.minimum]).collect());
-        (again, turned)
-    } else {
-        let mut followed: Vec<Followed> = others.par_iter().map(follow).collect();
-        followed.push(own);
-        followed.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-        let best = &followed[0];
-        let good = followed.iter().filter(|other| other.cost <= limit(best.cost));
-        let turned = best.turned.as_ref().unwrap_or(inliers).clone();
-        let again = |other: &Followed| {
-            let there = refine(&turned, other.minimum.motion, None, StoppingCriteria::ROUGH);
-            (there.motion.angle_to(&other.minimum.motion).to_degrees() < APART).then_some(there)
-        };
-        (different(good.filter_map(again).chain([best.minimum]).collect()), turned)
-    };
+    let again = |minimum: &Minimum| refine(&turned, minimum.motion, None, StoppingCriteria::ROUGH);
+    let again = different(others.par_iter().map(again).chain([own]).collect());
     // Without a rotation that can be taken out the linear model's minima stay.
     if again.is_empty() {
         return;
@@ -225,22 +192,14 @@ pub(crate) fn settle(
     }
 }
 
-/// The noise's variance in present units: 1, or what a minimum leaves.
-fn noise(cost: f64, n: usize, unknown: bool) -> f64 {
-    if unknown { cost / n.saturating_sub(5).max(1) as f64 } else { 1.0 }
-}
-
-/// A minimum with its own rotation taken out of the points, where that makes a difference.
-struct Followed {
-    minimum: Minimum,
-    turned: Option<Observations>,
-    /// What it leaves; infinite where points are led behind the camera, which then do not count, or by more
-    /// than half a turn.
-    cost: f64,
-}
-
-/// Turns the points about the rotation of a minimum until that stays.
-fn follow(whitening: &Whitening<'_>, points: &Observations, mut minimum: Minimum, unknown: bool) -> Followed {
+/// Takes the rotation of a minimum out of the points until it stays; without points where that makes no
+/// difference.
+fn follow(
+    whitening: &Whitening<'_>,
+    points: &Observations,
+    mut minimum: Minimum,
+    unknown: bool,
+) -> (Minimum, Option<Observations>) {
     let settled = if points.n < MANY { SETTLED } else { ROUGHLY };
     let mut negligible = if points.turn.is_some() { settled } else { NEGLIGIBLE };
     let mut turned: Option<Observations> = None;
@@ -248,9 +207,9 @@ fn follow(whitening: &Whitening<'_>, points: &Observations, mut minimum: Minimum
         let here = turned.as_ref().unwrap_or(points);
         let w = minimum.motion.w();
         let same = here.turn.is_some_and(|turn| (turn.rotation - w).norm() < ROUNDING);
-        if same
-            || shift(whitening, here, &minimum.motion) <= negligible * noise(minimum.equations.cost, points.n, unknown)
-        {
+        // The noise's variance in present units.
+        let noise = if unknown { minimum.equations.cost / points.n.saturating_sub(5).max(1) as f64 } else { 1.0 };
+        if same || shift(whitening, here, &minimum.motion) <= negligible * noise {
             break;
         }
         let next = whitening.derotated(here, minimum.motion.derotation());
@@ -258,10 +217,7 @@ fn follow(whitening: &Whitening<'_>, points: &Observations, mut minimum: Minimum
         turned = Some(next);
         negligible = settled;
     }
-    // More than half a turn is less of one the other way round.
-    let whole = minimum.motion.w().norm() > std::f64::consts::PI;
-    let lost = whole || turned.as_ref().is_some_and(|turned| turned.unseen() > points.unseen());
-    Followed { minimum, turned, cost: if lost { f64::INFINITY } else { minimum.equations.cost } }
+    (minimum, turned)
 }
 
 /// The rotation of two points that most points come near to.

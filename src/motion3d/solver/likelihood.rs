@@ -4,8 +4,7 @@ use super::covariance::direction_deviation;
 use super::efficient::{Efficient, WeightDepths, efficient};
 use super::refine::{FEWER, MANY, Minimum, StoppingCriteria, refine};
 use super::smoothing::DepthSmoother;
-use super::starts::{Searched, sample};
-use crate::math::by_chance;
+use super::starts::{sample, starts};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{depths, equations};
 use crate::motion3d::model::motion::Motion;
@@ -53,26 +52,14 @@ impl Candidate {
     }
 }
 
-/// The minima of `J`, the cheapest first, with the best sign each. Where the noise is not `unknown` and the
-/// best minimum leaves more than that, it is looked for from more starts.
-pub(crate) fn minima(observations: &Observations, unknown: bool, rng: CounterRng) -> Vec<Minimum> {
+/// The minima of `J`, the cheapest first, with the best sign each.
+pub(crate) fn minima(observations: &Observations, rng: CounterRng) -> Vec<Minimum> {
     let rounder = observations.rounder();
-    let first = rounder.first().unwrap_or(observations);
-    let searched = Searched::new(first, rng.stream(0));
-    let led = |starts: Vec<Motion>| {
-        let mut starts = starts;
-        for points in &rounder {
-            starts = refined(points, starts, rng).iter().map(|minimum| minimum.motion).collect();
-        }
-        refined(observations, starts, rng)
-    };
-    let found = led(searched.starts());
-    let free = observations.n.saturating_sub(5) as f64 / observations.points_per_independent_sample;
-    let noise = |best: &Minimum| by_chance(best.equations.cost, free);
-    if unknown || free <= 0.0 || found.first().is_none_or(noise) {
-        return found;
+    let mut starts = starts(rounder.first().unwrap_or(observations), rng.stream(0));
+    for points in &rounder {
+        starts = refined(points, starts, rng).iter().map(|minimum| minimum.motion).collect();
     }
-    different(found.into_iter().chain(led(searched.further())).collect())
+    refined(observations, starts, rng)
 }
 
 /// The minima that starts lead to.

@@ -30,10 +30,6 @@ const BEYOND: f64 = 0.25;
 const STARTS_WITHIN: usize = 3;
 const APART_WITHIN: f64 = 0.25;
 
-/// Starts that are refined where what the first left is no noise, and the least angle between them, degrees.
-const FURTHER: usize = 16;
-const APART_FURTHER: f64 = 4.0;
-
 /// Starts among what a few steps on a few points lead to.
 const BASINS: usize = 4;
 const FEW: usize = 128;
@@ -105,42 +101,22 @@ pub(crate) fn at_most(observations: &Observations, most: usize, rng: CounterRng)
     }
 }
 
-/// Directions that were looked at, each with the rotation that suits it best and what that leaves.
-pub(crate) struct Searched {
-    all: Vec<(Motion, f64)>,
-    basins: Vec<(Motion, f64)>,
-    within: Vec<(Motion, f64)>,
-    /// Least angle between starts within the picture, degrees.
-    apart: f64,
-}
-
-impl Searched {
-    /// The whole half sphere, and a narrow picture more closely, by `J` on at most 1000 random points.
-    pub fn new(observations: &Observations, rng: CounterRng) -> Self {
-        let searched = &*at_most(observations, SEARCHED, rng);
-        let best = |u: &Vector3<f64>| best_rotation(searched, u).map(|(w, cost)| (Motion::of(u, &w), cost));
-        let (within, width) = within(searched);
-        let all = evaluate(best);
-        let basins = basins(searched, &all, rng.stream(7));
-        Self { all, basins, within: each(&within, best), apart: (APART_WITHIN * width).to_degrees() }
+/// The most promising motions by `J` on at most 1000 random points: the best of the half sphere, the best of
+/// what few steps lead to, and the best within a narrow picture.
+pub(crate) fn starts(observations: &Observations, rng: CounterRng) -> Vec<Motion> {
+    let searched = &*at_most(observations, SEARCHED, rng);
+    let best = |u: &Vector3<f64>| best_rotation(searched, u).map(|(w, cost)| (Motion::of(u, &w), cost));
+    let all = evaluate(best);
+    let basins = apart(basins(searched, &all, rng.stream(7)), APART, BASINS);
+    let (within, width) = within(searched);
+    let within = apart(each(&within, best), (APART_WITHIN * width).to_degrees(), STARTS_WITHIN);
+    let mut starts: Vec<Motion> = Vec::new();
+    for (motion, _) in apart(all, APART, STARTS).into_iter().chain(basins).chain(within) {
+        if !starts.contains(&motion) {
+            starts.push(motion);
+        }
     }
-
-    /// The most promising motions: the best, and those in whose neighbourhood the least is left, lest all lie
-    /// in one long valley.
-    pub fn starts(&self) -> Vec<Motion> {
-        let all = apart(self.all.clone(), APART, STARTS).into_iter();
-        let basins = apart(self.basins.clone(), APART, BASINS);
-        let within = apart(self.within.clone(), self.apart, STARTS_WITHIN);
-        different(all.chain(basins).chain(within))
-    }
-
-    /// More of them, where none of those led to the flow's noise.
-    pub fn further(&self) -> Vec<Motion> {
-        let all = apart(self.all.clone(), APART_FURTHER, FURTHER).into_iter();
-        let basins = apart(self.basins.clone(), APART_FURTHER, FURTHER);
-        let within = apart(self.within.clone(), 0.5 * self.apart, FURTHER);
-        different(all.chain(basins).chain(within))
-    }
+    starts
 }
 
 /// What directions all over the half sphere lead to in a few steps on few points: a minimum may be so narrow
@@ -155,17 +131,6 @@ fn basins(observations: &Observations, all: &[(Motion, f64)], rng: CounterRng) -
         (minimum.motion, minimum.equations.cost)
     };
     apart(all.to_vec(), APART, all.len()).par_iter().with_min_len(TOGETHER).map(led).collect()
-}
-
-/// The motions, each once.
-fn different(motions: impl Iterator<Item = (Motion, f64)>) -> Vec<Motion> {
-    let mut kept: Vec<Motion> = Vec::new();
-    for (motion, _) in motions {
-        if !kept.contains(&motion) {
-            kept.push(motion);
-        }
-    }
-    kept
 }
 
 /// Directions all over a narrow picture and somewhat beyond it, none of a wide one; and the picture's half
