@@ -117,7 +117,6 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("gradient.oriented_box", "the box that hides the scene turns with the target"),
     ("gradient.outline_variance", "the covariance holds the error of the learned outline"),
     ("gradient.recall", "a target that vanishes goes on from its last good state"),
-    ("gradient.remainder", "what is left of an occluded target is not measured"),
     ("gradient.reshaped", "an affine map where the outline changes otherwise"),
     ("gradient.resized", "another size of a target that was occluded for long"),
     ("gradient.restart_filter", "the filter starts again where a jump was found"),

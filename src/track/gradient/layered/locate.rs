@@ -1,8 +1,8 @@
 //! The target in a frame: where the filter expects it, beside what covers or touches it, or all around.
 
 use super::finding::{
-    DOUBTED_INNOVATION, Finding, LEVELS, MAX_ADJACENT_SHARE, MAX_UNDOUBTED_INNOVATION, MIN_CONTRAST_PER_NOISE,
-    MIN_VISIBILITY, MIN_VISIBILITY_LOSS, MIN_VISIBILITY_TO_LEARN, PRIOR, SEARCHED, TOUCHED, try_at,
+    DOUBTED_INNOVATION, Finding, LEVELS, MAX_UNDOUBTED_INNOVATION, MIN_CONTRAST_PER_NOISE, MIN_VISIBILITY,
+    MIN_VISIBILITY_LOSS, MIN_VISIBILITY_TO_LEARN, PRIOR, SEARCHED, TOUCHED, try_at,
 };
 use super::initial::WHOLE_PIXEL_TOLERANCE;
 use super::occlusion::{
@@ -27,8 +27,6 @@ pub(super) const MIN_VISIBILITY_WITHOUT_SEARCH: f64 = 0.6;
 pub(super) const TOUCH: (f64, f64) = (0.08, 0.6);
 /// What is said where it did a moment ago, and its pull may still be felt.
 pub(super) const TOUCHED_BEFORE: &str = "something like the target touched it a moment ago";
-/// Loss of size from one frame to the next that only cover makes.
-pub(super) const MIN_SHRINKAGE: f64 = 0.1;
 /// Reach of the search, px: at first, and at most.
 pub(super) const REACH: (usize, usize) = (12, 36);
 
@@ -78,7 +76,6 @@ pub(super) fn locate(state: &State, frame: &Frame<f64>) -> Option<Finding> {
     if let Some(covered) = best.filter(|found| found.occluded) {
         best = locate_resized(state, frame, &covered).filter(|_| crate::ablation::keeps("gradient.resized")).or(best);
     }
-    let best = best.filter(|found| !crate::ablation::keeps("gradient.remainder") || !is_remainder(state, found));
     let least = MIN_VISIBILITY[usize::from(state.history.missed > 0)];
     best.filter(|found| {
         found.score.visibility >= least
@@ -114,20 +111,6 @@ fn locate_displaced(state: &State, frame: &Frame<f64>, plain: Option<&Finding>) 
     let found = try_at(state, frame, &state.placed(state.motion.pose, there), how)?;
     let least = plain.map_or(1.0, |plain| plain.score.visibility - MIN_VISIBILITY_LOSS).min(MIN_VISIBILITY_TO_LEARN);
     (is_there(&found) && found.score.visibility >= least).then_some(found)
-}
-
-/// Whether what was found is only what is left of a target that was covered or not seen in the frame
-/// before, for the edge of what covers it stands for its own: it is seen badly and became smaller, by
-/// much, or, right after it was covered, by less but off its way. Such a target is not seen; its way
-/// would end at that edge.
-pub(super) fn is_remainder(state: &State, found: &Finding) -> bool {
-    let pose = &found.aligned.pose;
-    let off = found.nis > DOUBTED_INNOVATION && found.score.leak < MAX_ADJACENT_SHARE && state.has_shrunk(pose);
-    let shrunk = pose.scale() < (1.0 - MIN_SHRINKAGE) * state.motion.pose.scale();
-    let was_hidden = state.history.occluded || state.history.missed > 0;
-    !found.occluded
-        && found.score.visibility < MIN_VISIBILITY_TO_LEARN
-        && (state.history.occluded && off || was_hidden && shrunk)
 }
 
 /// Whether an object that looks like the target touches it: much of it beside the target, on one side. A
