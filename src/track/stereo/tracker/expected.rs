@@ -13,9 +13,9 @@ use super::StereoTracker;
 use crate::mixture::Points;
 
 impl StereoTracker {
-    /// A guess of the motion of each component, px: that of the component which explains its middle best after
-    /// itself, probably of the same object. A new cluster has few pixels, often along one edge, which agree
-    /// with many motions.
+    /// A guess of the motion of each component, px: that of the component which explains its middle best
+    /// after itself, probably of the same object. A new cluster has few pixels, often along one edge, which
+    /// agree with many motions.
     fn guesses(&self, cell: [f64; 3], components: usize) -> Vec<Option<[f64; 2]>> {
         let gap = self.clock.gap;
         let known: Vec<(usize, [f64; 2])> = (0..components)
