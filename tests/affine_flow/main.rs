@@ -15,19 +15,12 @@ use jacoflow::synth::{AffineTexture, RotatingRamp, Scene, Sensor};
 use jacoflow::types::{FlowField, Frame, Mask, Rect, SamplingGrid, Status};
 use std::f64::consts::PI;
 
-#[path = "affine_flow/advect.rs"]
 mod advect;
-#[path = "affine_flow/derived_quantity.rs"]
 mod derived_quantity;
-#[path = "affine_flow/derived_region.rs"]
 mod derived_region;
-#[path = "affine_flow/derived_region_motion.rs"]
 mod derived_region_motion;
-#[path = "affine_flow/derived_sharing.rs"]
 mod derived_sharing;
-#[path = "affine_flow/derived_value.rs"]
 mod derived_value;
-#[path = "affine_flow/observability.rs"]
 mod observability;
 
 const W: f64 = PI / 100.0;

@@ -4,19 +4,12 @@ use jacoflow::flow::derived::{Quantity, plane};
 use jacoflow::flow::{Estimator, EstimatorOptions, Method};
 use jacoflow::types::{FlowField, Frame, MOTION_NAMES};
 
-#[path = "conventions/field.rs"]
 mod field;
-#[path = "conventions/frame.rs"]
 mod frame;
-#[path = "conventions/random.rs"]
 mod random;
-#[path = "conventions/region.rs"]
 mod region;
-#[path = "conventions/special.rs"]
 mod special;
-#[path = "conventions/status.rs"]
 mod status;
-#[path = "conventions/track.rs"]
 mod track;
 
 /// A quadratic carried by the motion `m` about pixel (4, 4), at frames -1, 0, 1, to second order in time.
