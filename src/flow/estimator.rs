@@ -56,7 +56,7 @@ impl Estimator {
         let engine = match &method {
             Method::CoarseToFine(o) => Engine::CoarseToFine(CoarseToFine::new(o)?),
             Method::Instantaneous(o) => Engine::Instantaneous(Box::new(Instantaneous::new(o, &options)?)),
-            Method::Windowed(o) => Engine::Windowed(Box::new(Windowed::new(o, &options)?)),
+            Method::Windowed(o) => Engine::Windowed(Box::new(Windowed::new(o)?)),
             Method::LucasKanade(o) => Engine::LucasKanade(LucasKanade::new(o, &options)?),
             Method::HornSchunck(o) => Engine::HornSchunck(HornSchunck::new(o, &options)?),
         };

@@ -53,11 +53,6 @@ impl RowSet {
             Self::All => 12,
         }
     }
-
-    /// Fewest frames that give these rows.
-    pub fn frames_needed(self) -> usize {
-        if self == Self::All { 3 } else { 2 }
-    }
 }
 
 /// Options of the windowed estimate with transport.
@@ -117,17 +112,11 @@ impl WindowedOptions {
     /// # Errors
     /// [`Error::Argument`] naming the option.
     pub fn check(&self) -> Result<()> {
-        let positive = |name: &'static str, value: f64| {
-            if value.is_finite() && value > 0.0 {
-                Ok(())
-            } else {
-                Err(Error::argument(name, "a positive, finite number", value))
+        let lengths = [("sigma", Some(self.sigma)), ("truncate", Some(self.truncate)), ("presmooth", self.presmooth)];
+        for (name, value) in lengths {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return Err(Error::argument(name, "a positive, finite number", value));
             }
-        };
-        positive("sigma", self.sigma)?;
-        positive("truncate", self.truncate)?;
-        if let Some(value) = self.presmooth {
-            positive("presmooth", value)?;
         }
         if self.sigma < 0.5 || self.sigma * self.truncate > MAX_RADIUS || self.sigma * self.truncate < 1.0 {
             let want = format!("at least 0.5 px, and with truncate a radius of 1 to {MAX_RADIUS} px");
@@ -136,7 +125,7 @@ impl WindowedOptions {
         if !(2..=3).contains(&self.frames) {
             return Err(Error::argument("frames", "2 or 3 for a windowed estimate", self.frames));
         }
-        if self.frames < self.rows.frames_needed() {
+        if self.frames == 2 && self.rows == RowSet::All {
             return Err(Error::argument("rows", "brightness, gradient or jet for a pair of frames", self.rows.name()));
         }
         Ok(())

@@ -37,7 +37,7 @@ pub(in crate::flow) struct Windowed {
 
 impl Windowed {
     /// Checks the options.
-    pub fn new(options: &WindowedOptions, _common: &EstimatorOptions) -> Result<Self> {
+    pub fn new(options: &WindowedOptions) -> Result<Self> {
         options.check()?;
         let stencil = JetStencil::new(&options.neighbourhood, (1.0, 1.0))?;
         let smoother = options.presmooth.map(GaussianSmoother::new).transpose()?;

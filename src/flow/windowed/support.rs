@@ -1,8 +1,10 @@
 //! Which pixels have equations at all.
 
 use crate::flow::site::MaskCounts;
+use crate::image::all_finite;
 use crate::jet::Reach;
 use crate::math::Real;
+use crate::simd::SimdReal;
 use crate::types::{Frame, Mask, Status};
 
 /// Usable pixels of a set of frames.
@@ -19,19 +21,15 @@ pub(super) struct Support {
 
 impl Support {
     /// Examines every sample of every frame. `spread`: radius of a smoothing to come, px.
-    pub fn new<T: Real>(frames: &[&Frame<T>], mask: Option<&Mask>, reach: Reach, spread: usize) -> Self {
+    pub fn new<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&Mask>, reach: Reach, spread: usize) -> Self {
         let size = frames[0].size();
-        let finite = frames.iter().all(|f| all_finite(f.data()));
+        let finite = frames.iter().all(|f| all_finite(f));
         let masked = mask.filter(|m| m.data().iter().any(|used| !used));
         if finite && masked.is_none() {
             return Self { size, reach, damage: None };
         }
-        let wide = Reach {
-            left: reach.left + spread,
-            right: reach.right + spread,
-            up: reach.up + spread,
-            down: reach.down + spread,
-        };
+        let [left, right, up, down] = [reach.left, reach.right, reach.up, reach.down].map(|side| side + spread);
+        let wide = Reach { left, right, up, down };
         let is_finite = |x: usize, y: usize| frames.iter().all(|f| f.get(x, y).finite());
         let broken = (!finite).then(|| MaskCounts::new(&Frame::from_fn(size.0, size.1, is_finite)));
         let masked = masked.map(MaskCounts::new);
@@ -100,21 +98,6 @@ impl Support {
             }
         }
     }
-}
-
-/// Whether every sample is finite: a sum of products with zero is zero exactly then.
-fn all_finite<T: Real>(data: &[T]) -> bool {
-    let zero = T::default();
-    data.chunks(256).all(|chunk| {
-        // Independent sums, so that additions need not wait for one another.
-        let mut sums = [zero; 16];
-        for part in chunk.chunks(16) {
-            for (sum, &v) in sums.iter_mut().zip(part) {
-                *sum += v * zero;
-            }
-        }
-        sums.iter().all(|s| *s == zero)
-    })
 }
 
 #[cfg(test)]
