@@ -163,7 +163,8 @@ fn with_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -
     let few = keeps("motion3d.single_noise") && scaled.observations.n < SELECTED;
     let single_noise = few.then(|| single_noise::noise_std(&scaled.observations, rng)).flatten();
     let single_noise = single_noise.map(|noise_std| noise_std * scaled.noise_std);
-    let found = noise_scale::consensus(whitening, scaled, rng)?;
+    scaled.take(noise_scale::FIRST_SHARE * scaled.observations.median_flow());
+    let found = in_noise(whitening, scaled, true, rng)?;
     let Some(noise_std) = single_noise.map(|noise_std| noise_std / scaled.noise_std) else { return Some(found) };
     let shorter = single_noise::shortening(&scaled.observations, &found, noise_std);
     // If both noises are nearly equal, the choice does no harm.
