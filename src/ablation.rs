@@ -18,8 +18,6 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("motion3d.larger_noise", "noise of the inliers that exceeds the given one inflates the covariance"),
     ("motion3d.residual_structure", "structured residuals are explained by two motions"),
     ("motion3d.hidden_object", "a motion of all points but one region is reported beside one of all"),
-    ("motion3d.regional_score", "a score test over parts of the picture"),
-    ("motion3d.residual_autocorrelation", "residuals of neighbours have the same sign"),
     ("motion3d.leverage", "few points that decide alone are reported as few_points"),
     ("motion3d.region_by_chance", "directions that residuals alone exclude are compared by depths and scores"),
     ("motion3d.basins", "starts from a few steps on a few points"),

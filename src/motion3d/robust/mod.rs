@@ -11,7 +11,6 @@ mod moving_objects;
 mod noise_scale;
 mod outlier_posterior;
 mod regional_score;
-mod residual_autocorrelation;
 mod residual_structure;
 mod search;
 mod single_noise;

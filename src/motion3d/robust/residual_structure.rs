@@ -1,15 +1,16 @@
 //! Whether residuals are those of noise, and what motion it may be instead.
 
 use super::regional_score::deviating_parts;
-use super::residual_autocorrelation::{MIN_POINTS, is_autocorrelated};
 use super::two_motion_fit::{Division, TwoMotionFit};
 use super::{APART, CompetingMotion, INLIER, truncated};
-use crate::ablation::keeps;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
+
+/// Minimum number of points for the test.
+const MIN_POINTS: usize = 50;
 
 /// Residuals whose mean square, in units of noise, is less than this do not matter.
 const LITTLE: f64 = 0.25;
@@ -36,13 +37,10 @@ pub(crate) fn competing_motion(
     points: &[u32],
     rng: CounterRng,
 ) -> Option<CompetingMotion> {
-    let mut parts = residual_structure(observations, found, points)?;
+    let parts = residual_structure(observations, found, points)?;
     let own = observations.subset(points);
     let (n, together) = (own.n as f64, refine(&own, *found, None, StoppingCriteria::FULL).equations.cost);
     let division = Division::of(own);
-    if parts.is_empty() {
-        parts = division.quarters();
-    }
     let divided = |part: &Vec<u32>| division.from(part, found, rng);
     let two = parts
         .iter()
@@ -57,8 +55,8 @@ pub(crate) fn competing_motion(
     (gain > ALL).then(|| CompetingMotion { motion: *motion, excess: excess.max(0.0), others: true })
 }
 
-/// Residual structure test of the inliers `points` of `motion`: residuals of neighbours have the same sign,
-/// or those of a part pull the estimate another way than those elsewhere. Returns these parts.
+/// Residual structure test of the inliers `points` of `motion`: the parts of the picture whose residuals pull
+/// the estimate another way than those elsewhere; `None` without one.
 fn residual_structure(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
     if points.len() < MIN_POINTS {
         return None;
@@ -68,10 +66,8 @@ fn residual_structure(observations: &Observations, motion: &Motion, points: &[u3
     if squares <= LITTLE * points.len() as f64 {
         return None;
     }
-    let parts =
-        if keeps("motion3d.regional_score") { deviating_parts(observations, motion, points) } else { Vec::new() };
-    (!parts.is_empty() || keeps("motion3d.residual_autocorrelation") && is_autocorrelated(observations, motion, points))
-        .then_some(parts)
+    let parts = deviating_parts(observations, motion, points);
+    (!parts.is_empty()).then_some(parts)
 }
 
 #[cfg(test)]

@@ -43,12 +43,6 @@ impl Division {
         Self { points, tree, near }
     }
 
-    /// Halves and quarters of the picture, by index.
-    pub fn quarters(&self) -> Vec<Vec<u32>> {
-        let halves = self.tree.halves(self.points.n / 4);
-        halves.into_iter().map(|places| self.tree.order()[places].to_vec()).collect()
-    }
-
     /// The division that is reached from a `part` (by index) and the rest, both of which move as `start` or
     /// nearly so; `None` where one of both loses its points.
     pub fn from(&self, part: &[u32], start: &Motion, rng: CounterRng) -> Option<TwoMotionFit> {
@@ -130,7 +124,6 @@ mod tests {
             let two = division.from(&part, &oblique(), CounterRng::new(seed)).unwrap();
             let off = [(0, oblique()), (1, object)].map(|(k, truth)| two.motions[k].angle_to(&truth).to_degrees());
             assert!(off[0] < 15.0 && off[1] < 15.0 && two.cost < 0.7 * one, "{seed}: {off:?} {} {one}", two.cost);
-            assert_eq!(division.quarters().iter().filter(|part| part.len() == 200).count(), 2);
         }
     }
 
