@@ -12,7 +12,6 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("motion3d.second_motion", "the rejected points are searched for a motion of their own"),
     ("motion3d.depth_gate", "points with unlikely depths are left out before the last fit"),
     ("motion3d.many_outliers", "among many outliers candidates are refined with outlier posteriors"),
-    ("motion3d.doubt_few", "few points with many outliers by chance are reported as few_points"),
     ("motion3d.outlier_mixture", "the last step weighs points by their outlier posterior"),
     ("motion3d.moving_objects", "inliers among rejected points are left out"),
     ("motion3d.larger_noise", "noise of the inliers that exceeds the given one inflates the covariance"),

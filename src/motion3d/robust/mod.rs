@@ -23,7 +23,7 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Scaled};
 use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::finite_rotation::decides;
-use crate::motion3d::solver::refine::{MANY, StoppingCriteria, refine};
+use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use crate::motion3d::solver::starts::at_most;
 use cells::Cells;
 use competing_motions::{among_many_outliers, competing_motions, second};
@@ -64,10 +64,6 @@ const GATES: usize = 2;
 
 /// Share of outliers among the inliers from which on they matter for the search.
 const MATTER: f64 = 0.03;
-
-/// From which share on the motions of few points are not known: which of them are outliers decides between
-/// directions far apart, whose residuals and depths are as likely.
-const DOUBT: f64 = 0.1;
 
 /// Fewest points that a motion is found from.
 const MIN_POINTS: usize = 5;
@@ -239,8 +235,6 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
         found = Consensus { many, ..Consensus::new(motion, inliers_of(observations, &motion)) };
         (inliers, outliers) = gate.passed(&found);
         competing = others;
-        let share = outliers.as_ref().map_or(0.0, |outliers| outliers.share);
-        found.doubtful = keeps("motion3d.doubt_few") && share > DOUBT && observations.n < MANY;
     }
     if inliers.len() >= MIN_POINTS {
         found.inliers = inliers;
