@@ -21,7 +21,6 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("motion3d.region_by_chance", "directions that residuals alone exclude are compared by depths and scores"),
     ("motion3d.basins", "starts from a few steps on a few points"),
     ("motion3d.narrow_field_starts", "closer starts within a narrow picture"),
-    ("motion3d.noise_free_steps", "steps near a minimum without the noise of the depths"),
     ("edges.contrast", "gain between the cameras is estimated and taken out"),
     ("edges.refused_cost", "matches of a high cost are refused"),
     ("edges.watched_rows", "a known row offset is estimated again where a pair contradicts it"),

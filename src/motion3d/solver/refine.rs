@@ -1,21 +1,14 @@
 //! Levenberg-Marquardt on the five unknowns of a motion.
 
-use crate::ablation::keeps;
 use crate::motion3d::kernels::{Equations, equations};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
+use crate::motion3d::model::rows::{Vector5, tangents};
 use nalgebra::{Matrix2x3, SMatrix};
 
 /// Points from which on there are many: so that a search takes no longer, it begins with fewer of them.
 pub(crate) const MANY: usize = 4000;
 pub(crate) const FEWER: usize = 2000;
-
-/// The largest share of `H` that may be noise of the depths where steps are taken without that.
-const MAX_NOISE_SHARE: f64 = 0.95;
-
-/// Deviations of a step that is near the minimum.
-const NEAR: f64 = 0.3;
 
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
@@ -64,22 +57,12 @@ impl Minimum {
     }
 }
 
-/// The step that solves the damped equations of `n` points; `None` where they have no solution.
-///
-/// Steps of Gauss and Newton with `H`, which has the noise of the depths in it, `P`: near the minimum they
-/// would leave the share `P / H` of the way, and are taken without it.
-fn step(equations: &Equations, n: usize, damping: f64) -> Option<Vector5> {
-    let Equations { h, p, gradient, .. } = equations;
-    let solved = |matrix: Matrix5| {
-        let damped = matrix + SMatrix::from_diagonal(&(h.diagonal() * damping));
-        let step = damped.cholesky()?.solve(gradient);
-        step.iter().all(|value| value.is_finite()).then_some(step)
-    };
-    let careful = solved(*h)?;
-    let near = keeps("motion3d.noise_free_steps")
-        && squared_deviations(equations, &careful, n) < NEAR * NEAR
-        && (h - p / MAX_NOISE_SHARE).cholesky().is_some();
-    if near { solved(h - p) } else { Some(careful) }
+/// The step that solves the damped equations; `None` where they have no solution.
+fn step(equations: &Equations, damping: f64) -> Option<Vector5> {
+    let Equations { h, gradient, .. } = equations;
+    let damped = h + SMatrix::from_diagonal(&(h.diagonal() * damping));
+    let step = damped.cholesky()?.solve(gradient);
+    step.iter().all(|value| value.is_finite()).then_some(step)
 }
 
 /// The square of a step in deviations of what is found, estimated from residuals of `n` points.
@@ -90,8 +73,7 @@ fn squared_deviations(equations: &Equations, step: &Vector5, n: usize) -> f64 {
 /// The minimum of `J` (with `cut`: of Tukey's loss) that is reached from `start`; the axes of `u` move along
 /// with it.
 ///
-/// The slope of `e` is `-D(nu^)` exactly: farther than [`NEAR`] from the minimum these are Gauss-Newton
-/// steps.
+/// The slope of `e` is `-D(nu^)` exactly: these are Gauss-Newton steps.
 pub(crate) fn refine(
     observations: &Observations,
     start: Motion,
@@ -101,7 +83,7 @@ pub(crate) fn refine(
     let mut here = Minimum::at(observations, start, cut);
     let mut damping = 1e-4;
     for _ in 0..effort.steps {
-        let Some(change) = step(&here.equations, observations.n, damping) else {
+        let Some(change) = step(&here.equations, damping) else {
             damping = (damping * 10.0f64).max(1e-6);
             if damping > 1e12 {
                 break;
@@ -158,19 +140,5 @@ mod tests {
         let found = refine(&scene.observations(), near, None, StoppingCriteria::FULL);
         assert!(found.motion.angle_to(&scene.motion) < 1e-9);
         assert!((found.motion.w() - scene.motion.w()).norm() < 1e-9);
-    }
-
-    /// Of depths so noisy that their noise is seven tenths of `H`, Gauss-Newton steps would leave as much of
-    /// the way each.
-    #[test]
-    fn noisy_depths_do_not_shorten_steps() {
-        let observations = Scene::oblique(20000, 0.3, 5).observations();
-        let least =
-            refine(&observations, Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]), None, StoppingCriteria::FULL);
-        let noisy = |share: f64| (least.equations.h - least.equations.p / share).cholesky().is_none();
-        assert!(noisy(0.7) && !noisy(MAX_NOISE_SHARE));
-        let near = least.motion.stepped(&least.tangent, &SMatrix::from([[0.004, -0.002, 0.0, 0.0, 0.0]]));
-        let found = refine(&observations, near, None, StoppingCriteria { steps: 3, ..StoppingCriteria::FULL });
-        assert!(found.motion.angle_to(&least.motion) < 1e-4, "{}", found.motion.angle_to(&least.motion));
     }
 }
