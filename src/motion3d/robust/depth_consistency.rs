@@ -6,7 +6,6 @@
 //! such depths are outliers if that many explain them (the local false discovery rate; B. Efron 2001).
 
 use super::cells::Cells;
-use super::moving_objects::more_than_usual;
 use super::outlier_posterior::{BAND, Bin, DOUBLING, OutlierPosterior};
 use super::{Consensus, INLIER};
 use crate::math::{median, quantile};
@@ -63,21 +62,16 @@ impl<'a> DepthConsistency<'a> {
         for &k in inliers {
             is_inlier[k as usize] = true;
         }
-        let around = within_cells(self.cells, &near, &is_inlier, &seen);
-        let (differences, rejected): (Vec<f64>, Vec<f64>) = around.into_iter().unzip();
-        let mut shares: Vec<f64> =
-            near.iter().zip(&rejected).filter(|(k, _)| is_inlier[**k as usize]).map(|(_, share)| *share).collect();
-        let limit = more_than_usual(&mut shares);
+        let differences = within_cells(self.cells, &near, &is_inlier, &seen);
         let (deviations, scene) = deviations(&near, &differences, &is_inlier, &seen);
         let n = self.observations.n;
         let outliers = OutlierPosterior::new(
             n,
             seen.e[..n].iter().filter(|e| e.abs() >= BAND.start).count(),
-            near.iter().zip(&deviations).zip(&rejected).map(|((&k, &deviation), &rejected)| Bin {
+            near.iter().zip(&deviations).map(|(&k, &deviation)| Bin {
                 point: k,
                 deviation,
                 is_inlier: is_inlier[k as usize],
-                among: is_inlier[k as usize] && rejected > limit,
                 residual: seen.e[k as usize],
             }),
         );
@@ -117,18 +111,17 @@ fn deviations(near: &[u32], differences: &[f64], is_inlier: &[bool], seen: &Dept
     (near.iter().zip(differences).map(deviation).collect(), scene)
 }
 
-/// Differences of depths from the median of the inliers in their cell, and the share of the others there.
-fn within_cells(cells: &Cells, near: &[u32], is_inlier: &[bool], seen: &Depths) -> Vec<(f64, f64)> {
-    let mut around = vec![(0.0, 0.0); is_inlier.len()];
+/// Differences of depths from the median of the inliers in their cell.
+fn within_cells(cells: &Cells, near: &[u32], is_inlier: &[bool], seen: &Depths) -> Vec<f64> {
+    let mut around = vec![0.0; is_inlier.len()];
     let mut depths = Vec::new();
     for members in cells.members() {
         depths.clear();
         depths.extend(members.iter().map(|&k| k as usize).filter(|&k| is_inlier[k]).map(|k| seen.nu[k]));
-        let cell = (median(&mut depths).unwrap_or(0.0), 1.0 - depths.len() as f64 / members.len() as f64);
+        let usual = median(&mut depths).unwrap_or(0.0);
         for &k in members {
-            around[k as usize] = cell;
+            around[k as usize] = usual;
         }
     }
-    let difference = |&k: &u32| (seen.nu[k as usize] - around[k as usize].0, around[k as usize].1);
-    near.iter().map(difference).collect()
+    near.iter().map(|&k| seen.nu[k as usize] - around[k as usize]).collect()
 }

@@ -64,7 +64,7 @@ pub(crate) fn inner(observations: &Observations, found: &Consensus, cells: &Cell
 }
 
 /// From which share of rejected neighbours on there are more than is usual among these; reorders them.
-pub(crate) fn more_than_usual(shares: &mut [f64]) -> f64 {
+fn more_than_usual(shares: &mut [f64]) -> f64 {
     let usual = median(shares).unwrap_or(0.0);
     let deviation = (usual.max(1.0 / NEAREST as f64) * (1.0 - usual) / NEAREST as f64).sqrt();
     usual + MORE * deviation

@@ -42,8 +42,6 @@ pub(crate) struct Bin {
     /// Of its depth, in units of what is usual.
     pub deviation: f64,
     pub is_inlier: bool,
-    /// Whether more of its neighbours are outliers than is usual.
-    pub among: bool,
     /// Across the epipolar line, in units of noise.
     pub residual: f64,
 }
@@ -123,10 +121,6 @@ impl OutlierPosterior {
         let (mut fitted, mut beside) = ([0usize; BINS], [0usize; BINS]);
         for point in points {
             let place = bin(point.deviation);
-            // Points of a moving object, which is connected, and not of a near one.
-            if point.among && place % SIZES >= FIRST.len() {
-                continue;
-            }
             bins[point.point as usize] = place as u8;
             fitted[place] += usize::from(point.is_inlier);
             beside[place] += usize::from(BAND.contains(&point.residual.abs()));
@@ -232,7 +226,6 @@ mod tests {
                     point,
                     deviation,
                     is_inlier,
-                    among: false,
                     residual: if is_inlier { 0.5 } else { 7.0 },
                 }),
             );
