@@ -249,8 +249,7 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
         && let Some(inner) = moving_objects::inner(observations, &found, &cells)
     {
         found.inner = inner.inliers;
-        found.has_inlier_neighbours = inner.has_inlier_neighbours;
-        found.competing.extend(inner.competitor);
+        found.has_inlier_neighbours = Some(inner.has_inlier_neighbours);
     }
     if keeps("motion3d.hidden_object") && observations.independent {
         let own;
