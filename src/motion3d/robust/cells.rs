@@ -1,12 +1,12 @@
-//! Neighbourhoods: cells of at most 32 points that lie together.
+//! Neighbourhoods: cells of at most 64 points that lie together.
 
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::neighbours::{Neighbours, Tree};
 use crate::motion3d::solver::refine::MANY;
 use std::ops::Range;
 
-/// Most points of a cell.
-const CELL: usize = 32;
+/// Most points of a cell: the median depth of 16 inliers among outliers is too noisy.
+const CELL: usize = 64;
 
 /// All points of a picture by cells.
 pub(crate) struct Cells {

@@ -33,7 +33,7 @@ const MIN_SCENE: f64 = 0.55;
 const MAX_OBJECT: f64 = 0.4;
 
 /// Mean share of the neighbours of an object's points that the scene's motion does not fit either.
-const MIN_COHERENCE: f64 = 0.5;
+const MIN_COHERENCE: f64 = 0.4;
 
 /// Standard deviations of the first direction within which another one is the same.
 const MAX_SAME: f64 = 2.5;
