@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes import motion3d as scenes
 from benchmarks.scores.motion3d import angle, squared
+from benchmarks.tables import motion3d_claims as claims
 from benchmarks.tables import motion3d_coverage as coverage
 from benchmarks.tables import motion3d_honesty as honesty
 from benchmarks.tables import motion3d_layouts as layouts
@@ -43,6 +44,14 @@ def plain(seed: int, n: int) -> coverage.Estimated:
     return motion3d.estimate_motion(pixels, flow, scenes.K, robust=True, threads=1), u, 0.1 * w
 
 
+def exact(seed: int) -> coverage.Estimated:
+    """Two views without noise that turn fast, of a camera that moves by a fiftieth to a fifth of the depth."""
+    rng = np.random.default_rng((seed, 78))
+    make = claims.displaced(rng.choice([0.02, 0.1, 0.2]), rng.uniform(0.02, 0.3), seed, 200)
+    found = motion3d.estimate_motion(make.points, make.flow, noise_std=1e-6, robust=True, threads=1)
+    return found, make.u, make.w
+
+
 GROUPS: dict[str, list[Callable[[int], coverage.Estimated]]] = {
     "random": [lambda seed: random_scene(seed, False), lambda seed: random_scene(seed, True)],
     "objects": [lambda seed, ratio=ratio: layouts.thing(seed, ratio) for ratio in (1.0, 20.0, 100.0)]
@@ -51,6 +60,7 @@ GROUPS: dict[str, list[Callable[[int], coverage.Estimated]]] = {
     + [coverage.few_points, lambda seed: coverage.far_background(seed, 0.2)],
     "planes": [lambda seed, ratio=ratio: layouts.plane(seed, ratio) for ratio in (1.0, 30.0)],
     "views": [lambda seed, depth=depth: layouts.views(seed, depth, 0.05) for depth in ("waves", "plane")],
+    "exact": [exact],
     "lenses": [coverage.long_lens, layouts.band],
     "patches": [coverage.patches],
     "plain": [lambda seed: plain(seed, 1000)],
