@@ -10,7 +10,7 @@ from jacoflow import motion3d
 from benchmarks.tables import motion3d_fields as fields  # isort: skip
 from benchmarks.scenes import rooms  # isort: skip
 
-ROOMS = 8
+ROOMS = 12
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def seen():
 def test_ellipsoids_hold_as_often_as_they_say(seen, method, way):
     """Of the few of so few rooms that are ok nearly all. Errors of patches of slow, precise flow may go together farther than is told."""
     row = fields.row(f"{method}, {way}", fields.estimated(seen[method], way))
-    assert row["wrong"] == 0 and row["ok"] >= (8 if method == "coarse_to_fine" else 1), row
+    assert row["wrong"] == 0 and row["ok"] >= (12 if method == "coarse_to_fine" else 1), row
     least = 0.88 if way != "patches=48" else 0.7
     assert row["ellipsoid"] >= least and row["ellipse"] >= least, row
 
