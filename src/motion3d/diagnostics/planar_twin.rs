@@ -16,6 +16,7 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Row};
 use crate::motion3d::model::rows::Rows;
 use crate::motion3d::model::whitening::Whitening;
+use crate::motion3d::solver::covariance::DETERMINED;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use crate::motion3d::solver::starts::at_most;
 use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, SymmetricEigen, Vector2, Vector3};
@@ -26,9 +27,6 @@ const NUMBERS: usize = 8;
 
 /// Steps towards a homography; the flow of a plane is linear in its numbers.
 const STEPS: usize = 5;
-
-/// Least eigenvalue of the scaled normal equations that is not rounding.
-const DETERMINED: f64 = 1e-12;
 
 /// The likeliest flow of a plane.
 pub(crate) struct PlaneFlow {

@@ -2,6 +2,7 @@
 
 use crate::math::by_chance;
 use crate::motion3d::model::observations::{Observations, ROUNDING};
+use crate::motion3d::solver::covariance::DETERMINED;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// Least squares for the rotation alone.
@@ -21,9 +22,6 @@ impl RotationOnly {
         Self { covariance: self.covariance / square, chi2: self.chi2 * square, ..self }
     }
 }
-
-/// Least share of the information that is not rounding.
-const DETERMINED: f64 = 1e-12;
 
 /// Standard deviations by which the best of all directions explains pure noise better than any one would, and
 /// a margin; what few points add to that.

@@ -11,7 +11,7 @@ use crate::motion3d::model::result::{Alternative, Status};
 use crate::motion3d::model::rows::{Matrix5, tangents};
 use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::robust::CompetingMotion;
-use crate::motion3d::solver::covariance::direction_deviation;
+use crate::motion3d::solver::covariance::{DETERMINED, direction_deviation};
 use crate::motion3d::solver::likelihood::SAME;
 use crate::motion3d::solver::starts::{SEARCHED, sample};
 use nalgebra::SymmetricEigen;
@@ -43,10 +43,6 @@ const BLIND: f64 = 20.0;
 
 /// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
 const EXCLUDED: f64 = 25.0;
-
-/// Least eigenvalue of the information, relative to what points all over the screen would give, that is not
-/// rounding.
-const DETERMINED: f64 = 1e-12;
 
 /// What else speaks for or against a motion.
 pub(crate) struct Evidence<'a> {

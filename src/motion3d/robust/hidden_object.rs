@@ -15,6 +15,7 @@ use crate::motion3d::model::options::Smoother;
 use crate::motion3d::model::rows::tangents;
 use crate::motion3d::solver::covariance::{direction_deviation, inverse};
 use crate::motion3d::solver::likelihood::cost_of;
+use crate::motion3d::solver::profile_likelihood::ROUND;
 use crate::motion3d::solver::refine::refine;
 use crate::motion3d::solver::smoothing::DepthSmoother;
 use crate::motion3d::solver::starts::at_most;
@@ -40,9 +41,6 @@ const MAX_SAME: f64 = 2.5;
 
 /// By how much, in units of `sqrt(n)`, the depth map of the other motion may be less likely.
 const MAX_ROUGHER: f64 = 1.0;
-
-/// Times that noise may be as large along one axis as along the other to count as round.
-const ROUND: f64 = 6.0;
 
 /// Points and starts of the search outside of one region, and refinements of what it finds.
 const SEARCHED: usize = 200;

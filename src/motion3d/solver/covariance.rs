@@ -12,7 +12,7 @@ const MIN_INFORMATION_RATIO: f64 = 1e-3;
 
 /// Least eigenvalue of an information in units of its own diagonal, below which it may be rounding; a field
 /// of half a degree leaves a million times as much.
-const ROUNDING: f64 = 1e-12;
+pub(crate) const DETERMINED: f64 = 1e-12;
 
 /// What the data say about the covariance of maximum likelihood and the bound.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +36,7 @@ pub(crate) fn determined(information: &Matrix5) -> Option<Matrix5> {
     let unitless = units * information * units;
     let finite = unitless.iter().all(|value| value.is_finite());
     let least = if finite { SymmetricEigen::new(unitless).eigenvalues.min() } else { 0.0 };
-    if least > ROUNDING { inverse(information) } else { None }
+    if least > DETERMINED { inverse(information) } else { None }
 }
 
 /// The covariances by `H` and the noise `P` of its depths at a minimum; `None` where noise makes up nearly

@@ -21,7 +21,7 @@ const STRAIGHT: f64 = 0.08;
 const STRAIGHT_AMONG: f64 = 0.03;
 
 /// Times that noise may be as large along one axis as along the other to count as round.
-const ROUND: f64 = 6.0;
+pub(crate) const ROUND: f64 = 6.0;
 
 /// The 0.95 quantile of chi squared with one degree of freedom.
 const END: f64 = 3.841;
