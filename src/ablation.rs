@@ -30,6 +30,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("stereo.own_pixels", "the middle is of pixels that show the own surface"),
     ("stereo.second_way", "Lucas-Kanade by two ways through the levels"),
     ("stereo.beside_start", "Lucas-Kanade from the motion of the component beside"),
+    ("stereo.successors", "components are renamed by mutual overlap"),
     ("stereo.join_pieces", "pieces of a surface are joined after a cold start"),
     ("stereo.part", "components that hold several objects are parted after a cold start"),
     ("stereo.outlier_voxels", "voxels that nothing explains are not fitted"),

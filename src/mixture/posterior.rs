@@ -87,6 +87,22 @@ impl Posterior {
         keep_rows(&mut self.scale_inverses, d * d, keep);
     }
 
+    /// The components renamed: component `k` is `names[k]` of the result.
+    #[must_use]
+    pub fn renamed(&self, names: &[usize]) -> Self {
+        let d = self.dimensions;
+        let mut out = self.clone();
+        for (k, &name) in names.iter().enumerate() {
+            out.weight_concentration[name] = self.weight_concentration[k];
+            out.mean_precision[name] = self.mean_precision[k];
+            out.degrees_of_freedom[name] = self.degrees_of_freedom[k];
+            out.means[name * d..(name + 1) * d].copy_from_slice(&self.means[k * d..(k + 1) * d]);
+            let (to, from) = (name * d * d, k * d * d);
+            out.scale_inverses[to..to + d * d].copy_from_slice(&self.scale_inverses[from..from + d * d]);
+        }
+        out
+    }
+
     /// With `by` taken off (`sign` -1) or put on (1) the means.
     pub(super) fn moved(mut self, by: &[f64], sign: f64) -> Self {
         for mean in self.means.chunks_exact_mut(self.dimensions) {

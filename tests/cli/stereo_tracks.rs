@@ -46,7 +46,7 @@ fn every_layout_gives_the_same_tracks() {
 }
 
 #[test]
-fn missing_frames_are_told_by_their_times() {
+fn missing_frames_are_found_by_their_times() {
     // The views 3 and 5 of a film.
     let shown: [usize; 6] = [0, 1, 2, 4, 6, 7];
     let place = recorded_as(6, |index| moving(shown[index]));
@@ -63,8 +63,8 @@ fn missing_frames_are_told_by_their_times() {
         let speeds = speeds(options);
         assert!(speeds.iter().zip(want).all(|(u, want)| (u - want).abs() < 0.1), "{options}: {speeds:?}");
     }
-    place.good(&format!("track left right {SMALL} --times times.csv --quiet -o told"));
-    let rows = fs::read_to_string(place.path("told/tracks.csv")).unwrap();
+    place.good(&format!("track left right {SMALL} --times times.csv --quiet -o timed"));
+    let rows = fs::read_to_string(place.path("timed/tracks.csv")).unwrap();
     let last: Vec<&str> = rows.lines().next_back().unwrap().split(',').collect();
     assert_eq!(last[1], "5");
     assert!((last[2].parse::<f64>().unwrap() - 0.28).abs() < 1e-9, "{last:?}");

@@ -38,6 +38,18 @@ impl Clusters {
         Self { voxels, points, members, pixels, of_point, dense }
     }
 
+    /// Renumbers the components.
+    pub fn renamed(mut self, names: &[usize]) -> Self {
+        self.members = reordered(self.members, names);
+        self.pixels = reordered(self.pixels, names);
+        self.of_point.iter_mut().for_each(|label| *label = names[*label as usize] as u32);
+        self.dense
+            .iter_mut()
+            .filter(|label| **label != NOBODY)
+            .for_each(|label| *label = names[usize::from(*label)] as u16);
+        self
+    }
+
     /// The grid.
     pub fn lattice(&self) -> &Lattice {
         &self.voxels.lattice
@@ -73,6 +85,13 @@ impl Clusters {
     }
 }
 
+/// Puts the value of each component at its new number.
+fn reordered<T>(values: Vec<T>, names: &[usize]) -> Vec<T> {
+    let mut named: Vec<(usize, T)> = names.iter().copied().zip(values).collect();
+    named.sort_by_key(|(name, _)| *name);
+    named.into_iter().map(|(_, value)| value).collect()
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::super::voxels::tests::lattice;
@@ -101,5 +120,14 @@ pub(super) mod tests {
         assert_eq!(clusters.of_point, [0, 2, 2, 2, 2]);
         assert_eq!((clusters.members[2].len(), clusters.pixels[2].len(), clusters.pixels[1].len()), (3, 4, 0));
         assert_eq!(clusters.template(2), [[1, 2], [4, 2]]);
+        let renamed = clusters.clone().renamed(&[0, 2, 1, 3]);
+        assert_eq!((renamed.at([1, 2, 3]), renamed.at([1, 2, 9]), renamed.at([0, 0, 0])), (Some(0), Some(1), None));
+        assert_eq!(renamed.of_point, [0, 1, 1, 1, 1]);
+        assert_eq!((&renamed.members[1], &renamed.pixels[1]), (&clusters.members[2], &clusters.pixels[2]));
+    }
+
+    #[test]
+    fn what_belongs_to_components_goes_with_their_names() {
+        assert_eq!(reordered(vec!['a', 'b', 'c'], &[2, 0, 1]), ['b', 'c', 'a']);
     }
 }

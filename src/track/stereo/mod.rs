@@ -8,7 +8,7 @@
 //! * [`measured_motion`]: [`cluster_motion`] of the last step's clusters, under the [`exposure`] of this one,
 //!   and its [`depth_change`] (paper mode: [`cell_motion`]);
 //! * [`warm_start`]: the mixture carried to this step, new seeds, split and merge;
-//! * [`clusters`]: voxels and pixels of each component; [`overlap`] with the last step;
+//! * [`clusters`]: voxels and pixels of each component; [`overlap`] with the last step; [`succession`];
 //! * [`association`]: which track each component is, over time gaps of the [`clock`];
 //! * [`own_pixels`], [`grouping`], [`graph`], [`step`]: middles, objects, arcs and the result.
 //!
@@ -33,6 +33,7 @@ mod options;
 mod overlap;
 mod own_pixels;
 mod step;
+mod succession;
 mod tracker;
 mod voxels;
 mod warm_start;

@@ -16,7 +16,7 @@ use super::super::voxels::{EdgePoints, Voxels};
 use super::super::warm_start::{is_left_over, moved};
 use super::StereoTracker;
 use super::cluster::Clustered;
-use super::meeting::{Overlaps, arcs, both_ways};
+use super::meeting::arcs;
 use super::record::{Arrival, Departure};
 use crate::error::Result;
 use crate::mixture::Posterior;
@@ -93,10 +93,12 @@ impl StereoTracker {
             None => vec![],
         };
         let start = self.posterior.as_ref().map(|posterior| moved(posterior, &carried));
-        let (Clustered { clusters, posterior, rounds }, seeded) = self.cluster_carried(points, voxels, start)?;
-        let (forward, backward): Overlaps = last.as_ref().map_or_else(Default::default, |last| {
-            both_ways(&last.clusters, &clusters, &self.moves(&last.clusters, &clusters, &motions))
-        });
+        let (clustered, seeded) = self.cluster_carried(points, voxels, start)?;
+        let (clustered, seeded, (forward, backward)) = match &last {
+            Some(last) => self.succeeding(&last.clusters, clustered, seeded, &motions),
+            None => (clustered, seeded, (vec![], vec![])),
+        };
+        let Clustered { clusters, posterior, rounds } = clustered;
         let components = clusters.components();
         // A cluster that gets hidden meets little of its moved self, but its rest lies there; one that
         // reappears, the reverse.

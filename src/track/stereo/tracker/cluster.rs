@@ -26,6 +26,12 @@ impl Clustered {
     fn nothing(points: EdgePoints, voxels: Voxels) -> Self {
         Self { clusters: Clusters::new(points, voxels, &[], 0), posterior: None, rounds: 0 }
     }
+
+    /// Renumbers the components.
+    pub fn renamed(self, names: &[usize]) -> Self {
+        let posterior = self.posterior.map(|posterior| posterior.renamed(names));
+        Self { clusters: self.clusters.renamed(names), posterior, rounds: self.rounds }
+    }
 }
 
 impl StereoTracker {
