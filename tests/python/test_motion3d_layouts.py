@@ -4,8 +4,7 @@ import pytest
 
 from motion3d_support import layouts
 
-TRIALS = 150
-"""Of 135 right estimates more than 10.5 % are outside of 95 % ellipsoids by chance once in a hundred cases."""
+TRIALS = 300
 ROWS = {part: list(layouts.cases([part])) for part in ("layouts", "noise", "things", "planes", "views")}
 
 
@@ -16,7 +15,7 @@ def coverage_of(name: str) -> dict:
 @pytest.mark.parametrize("name", ROWS["layouts"] + ROWS["noise"])
 def test_points_and_noise_of_any_layout_and_shape(name):
     row = coverage_of(name)
-    assert row["ok"] >= 45 and row["wrong"] <= 1 and 0.89 <= row["ellipsoid"] <= 0.99, row
+    assert row["ok"] >= 90 and row["wrong"] <= 2 and 0.89 <= row["ellipsoid"] <= 0.98, row
 
 
 @pytest.mark.parametrize("name", ROWS["things"])
@@ -24,28 +23,28 @@ def test_what_an_object_and_the_scene_nearly_share_is_not_the_scene(name):
     """Some have another motion down to the noise; the longer its axes, the more."""
     row = coverage_of(name)
     silent, held = (0.06, 0.87) if name.endswith(" 1 to 1") else (0.22, 0.7)
-    assert row["ok"] >= 25 and row["wrong"] <= silent * row["ok"] and held <= row["ellipsoid"] <= 0.98, row
+    assert row["ok"] >= 50 and row["wrong"] <= silent * row["ok"] and held <= row["ellipsoid"] <= 0.98, row
 
 
 @pytest.mark.parametrize("name", ROWS["planes"])
 def test_another_motion_of_a_plane_is_reported_in_any_noise(name):
     """About half of them have one."""
     row = coverage_of(name)
-    assert row["ok"] >= 45 and row["wrong"] == 0 and 0.88 <= row["ellipsoid"] <= 0.98, row
+    assert row["ok"] >= 90 and row["wrong"] == 0 and 0.88 <= row["ellipsoid"] <= 0.98, row
     assert "ambiguous" in row["others"]
 
 
 def test_minima_that_are_narrow_in_a_wide_picture_are_found():
-    """One in 150 is a coin toss between motions that explain the flow alike."""
+    """Two in 300 are a coin toss between motions that explain the flow alike."""
     (name,) = layouts.cases(["band"])
     row = coverage_of(name)
-    assert row["ok"] >= 100 and row["wrong"] <= 2 and 0.88 <= row["ellipsoid"] <= 0.97, row
+    assert row["ok"] >= 200 and row["wrong"] <= 3 and 0.88 <= row["ellipsoid"] <= 0.97, row
 
 
 @pytest.mark.parametrize("name", ROWS["views"])
 def test_long_displacements_in_large_noise_are_not_explained_by_large_turns(name):
     """Of a plane few motions are without another; their ellipsoids are too few to be counted."""
     row = coverage_of(name)
-    assert row["wrong"] <= 2, row
+    assert row["wrong"] <= 3, row
     if "plane" not in name:
-        assert row["ok"] >= 30 and 0.87 <= row["ellipsoid"] <= 0.98, row
+        assert row["ok"] >= 60 and 0.87 <= row["ellipsoid"] <= 0.98, row

@@ -1,12 +1,15 @@
-//! Neighbourhoods: cells of at most 64 points that lie together.
+//! Neighbourhoods: about sixteen cells of points that lie together.
 
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::neighbours::{Neighbours, Tree};
 use crate::motion3d::solver::refine::MANY;
 use std::ops::Range;
 
-/// Most points of a cell: the median depth of 16 inliers among outliers is too noisy.
-const CELL: usize = 64;
+/// Number of cells: an object on a tenth of the picture fills one.
+const CELLS: usize = 16;
+/// Bounds of the largest number of points of a cell: the median depth of fewer is too noisy, and more are not
+/// needed.
+const CELL_POINTS: [usize; 2] = [32, 64];
 
 /// All points of a picture by cells.
 pub(crate) struct Cells {
@@ -18,7 +21,7 @@ impl Cells {
     /// For these points.
     pub fn new(observations: &Observations) -> Self {
         let tree = Tree::new(&observations.site[..observations.n]);
-        let cells = tree.cells(CELL);
+        let cells = tree.cells(observations.n.div_ceil(CELLS).clamp(CELL_POINTS[0], CELL_POINTS[1]));
         Self { tree, cells }
     }
 
