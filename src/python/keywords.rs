@@ -58,6 +58,7 @@ macro_rules! getters {
                 $(#[$doc])*
                 #[getter]
                 #[allow(unused_variables, reason = "not every value needs both")]
+                #[allow(clippy::elidable_lifetime_names, reason = "not every type has the lifetime")]
                 fn $name<'py>(slf: &Bound<'py, Self>) -> $type {
                     let $this = slf.get();
                     $(let $slf = slf;)?

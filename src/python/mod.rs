@@ -74,8 +74,7 @@ mod _jacoflow {
     #[pymodule_export]
     use super::motion3d::{
         motion3d_bound, motion3d_contact_map, motion3d_essential, motion3d_estimate, motion3d_estimate_field,
-        motion3d_field_points, motion3d_focus, motion3d_lateral, motion3d_lateral_bound,
-        motion3d_predict,
+        motion3d_field_points, motion3d_focus, motion3d_lateral, motion3d_lateral_bound, motion3d_predict,
     };
     #[pymodule_export]
     use super::observability::{classify, observability};

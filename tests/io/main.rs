@@ -54,9 +54,7 @@ fn data(part: &str) -> Option<PathBuf> {
 }
 
 fn options(colour: Colour) -> OpenOptions {
-    let mut options = OpenOptions::default();
-    options.colour = colour;
-    options
+    OpenOptions { colour, ..OpenOptions::default() }
 }
 
 /// Number of frames and their size.

@@ -4,7 +4,10 @@ use jacoflow::error::{Error, Result};
 use jacoflow::image::picture::TrackOverlay;
 use jacoflow::io::{Colour, ColourSource, Grey, MemorySource, read_image, read_mot};
 use jacoflow::parallel::{Progress, Silent};
-use jacoflow::pipeline::{ForegroundMaps, Numbering, ParticleOverlays, ParticleRows, ParticleRun, ParticleSink, TableTarget, TargetStart, TrackFormat};
+use jacoflow::pipeline::{
+    ForegroundMaps, Numbering, ParticleOverlays, ParticleRows, ParticleRun, ParticleSink, TableTarget, TargetStart,
+    TrackFormat,
+};
 use jacoflow::track::particle::ParticleOptions;
 use jacoflow::types::{AnyColourFrame, Frame, TargetBox};
 use std::cell::Cell;

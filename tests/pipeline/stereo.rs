@@ -4,7 +4,10 @@ use jacoflow::error::{Error, Result};
 use jacoflow::image::Preprocess;
 use jacoflow::io::{MemorySource, ViewPairs};
 use jacoflow::parallel::{Silent, Threads};
-use jacoflow::pipeline::{BeginSinks, ClusterRows, Ending, GraphChart, GraphFile, GreyPairs, Numbering, StereoOverlays, StereoPicture, StereoRun, StereoSink, StereoStep, StereoSummary, TableTarget};
+use jacoflow::pipeline::{
+    BeginSinks, ClusterRows, Ending, GraphChart, GraphFile, GreyPairs, Numbering, StereoOverlays, StereoPicture,
+    StereoRun, StereoSink, StereoStep, StereoSummary, TableTarget,
+};
 use jacoflow::track::StereoTracker;
 use jacoflow::track::stereo::{StereoMode, StereoTrackerOptions, TrackGraph};
 use jacoflow::types::{AnyFrame, Frame};

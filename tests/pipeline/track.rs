@@ -5,7 +5,9 @@ use jacoflow::image::picture::TrackOverlay;
 use jacoflow::image::{GaussianSmoother, Preprocess};
 use jacoflow::io::{Colour, FrameSource, MemorySource, read_image, read_mot};
 use jacoflow::parallel::Silent;
-use jacoflow::pipeline::{Begin, Begun, Numbering, Overlays, TableTarget, TextFormat, TrackFormat, TrackRows, TrackRun, TrackSink, peek};
+use jacoflow::pipeline::{
+    Begin, Begun, Numbering, Overlays, TableTarget, TextFormat, TrackFormat, TrackRows, TrackRun, TrackSink, peek,
+};
 use jacoflow::track::Tracker;
 use jacoflow::types::{AnyFrame, Frame, TargetBox, TrackState, TrackStatus};
 use std::path::Path;

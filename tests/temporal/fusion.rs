@@ -1,7 +1,7 @@
 //! Fusion of synthetic estimates with known noise and systematic error.
 
-use jacoflow::math::Real;
 use jacoflow::flow::{Estimator, EstimatorOptions, Method};
+use jacoflow::math::Real;
 use jacoflow::math::random::CounterRng;
 use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
@@ -27,7 +27,8 @@ fn estimator(threads: usize, simd: Option<Level>) -> Estimator {
 /// A fusion of estimates in the given precision.
 macro_rules! fusion {
     ($real:ty, $forgetting:expr, $threads:expr, $simd:expr) => {
-        RecursiveFusion::<$real>::new(&estimator($threads, $simd), RecursiveOptions { forgetting: $forgetting }).unwrap()
+        RecursiveFusion::<$real>::new(&estimator($threads, $simd), RecursiveOptions { forgetting: $forgetting })
+            .unwrap()
     };
 }
 

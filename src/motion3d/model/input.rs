@@ -127,7 +127,7 @@ impl Flow<'_> {
                 Err(Error::argument("cov", expected, format!("{} values", c.len())))
             }
             Noise::Covariances(c) => self.check_covariances(c, values),
-            _ => Ok(()),
+            Noise::Unknown => Ok(()),
         }
     }
 }

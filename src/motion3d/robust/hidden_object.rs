@@ -92,7 +92,9 @@ pub(crate) fn hidden_object(
 /// Motions that a search without the points of a `region` finds.
 fn outside(observations: &Observations, region: &[u32], rng: CounterRng) -> Vec<Motion> {
     let mut is_inside = vec![false; observations.n];
-    region.iter().for_each(|&k| is_inside[k as usize] = true);
+    for &k in region {
+        is_inside[k as usize] = true;
+    }
     let rest: Vec<u32> = (0..observations.n as u32).filter(|&k| !is_inside[k as usize]).collect();
     let rest = observations.subset(&rest);
     let rest = &*at_most(&rest, SEARCHED, rng.stream(1));
@@ -117,7 +119,9 @@ fn of_scene(observations: &Observations, mut motion: Motion) -> Option<(Motion, 
 /// Whether the points that only the first motion fits lie together, as those of an object do.
 fn is_one_region(around: &Neighbourhoods<'_>, fitted: &[u32], scene: &[u32], n: usize) -> bool {
     let mut is_scene = vec![false; n];
-    scene.iter().for_each(|&k| is_scene[k as usize] = true);
+    for &k in scene {
+        is_scene[k as usize] = true;
+    }
     let rejected = around.rejected(&is_scene);
     let lost: Vec<f64> = fitted.iter().filter(|&&k| !is_scene[k as usize]).map(|&k| rejected[k as usize]).collect();
     let coherence = lost.iter().sum::<f64>() / lost.len().max(1) as f64;

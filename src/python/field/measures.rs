@@ -2,8 +2,8 @@
 
 use super::{FlowField, Store, derived, each};
 use crate::python::arrays;
-use crate::python::options::{self, Region};
 use crate::python::keywords::getters;
+use crate::python::options::{self, Region};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 

@@ -1,9 +1,9 @@
 //! What Python sees of a `FlowField`.
 
 use super::{FlowField, Slice, Store, each, state};
+use crate::python::keywords::getters;
 use crate::python::{arrays, io};
 use crate::types::{SamplingGrid, Status};
-use crate::python::keywords::getters;
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice, PyTuple};

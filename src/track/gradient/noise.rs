@@ -18,7 +18,9 @@ pub(super) fn noise_of(first: &Frame<f64>, second: &Frame<f64>, samples: usize) 
 /// Standard deviation of values about their median, robustly; 0 of nothing.
 pub(super) fn scatter_of(mut values: Vec<f64>) -> f64 {
     let middle = median(&mut values);
-    values.iter_mut().for_each(|value| *value = (*value - middle).abs());
+    for value in &mut values {
+        *value = (*value - middle).abs();
+    }
     robust_std(&mut values).unwrap_or(0.0)
 }
 
