@@ -14,12 +14,13 @@
 //! # Files, in the order of the data
 //! `options`; `run` (crop, smoothing, strips of rows) with `support` (usable pixels) and `combine` (frames to
 //! coefficients and time differences); `tile` (jets, product planes, moments) with `rows` (products of the
-//! equations) and `window` (weights); `estimate` with `solve` (normal equations, status); `results` (to the
-//! field).
-//! The covariance: `noise_setting` and `noise` (how pixel noise enters the equations), `high_frequencies`
-//! (the noise of the frames), `truncation` and `bias_planes` (biases of the equations and of flow that is not
-//! affine), `covariance` with `covariance_kernels` (sums over windows), `sandwich` (one row of covariances),
-//! `noise_dominated` (directions that only noise determines).
+//! equations) and `window` (weights); `estimate` with `solve` (normal equations, status) and
+//! `rounding_floor` (what rounding leaves of an even image); `results` (to the field).
+//! The covariance: `noise_setting` and `noise` (how pixel noise enters the equations), `jet_matrix` (their
+//! matrix as a function of the jet), `high_frequencies` (the noise of the frames), `truncation` and
+//! `bias_planes` (biases of the equations and of flow that is not affine), `covariance` with
+//! `covariance_kernels` (sums over windows), `sandwich` (one row of covariances), `noise_dominated`
+//! (directions that only noise determines).
 //!
 //! # Pixels without data
 //! Samples that are NaN, infinite or masked invalidate every pixel whose jet (or smoothing) reaches them: NaN

@@ -1,10 +1,9 @@
 //! Which directions explain the flow as well as the estimate does.
 //!
 //! Two directions leave different components of the noise as residuals: across lines that are turned by `phi`
-//! against each other, the difference of `J` has the variance `4 sum sin^2 phi` in any case. Where
-//! depths are mostly noise, that hides the truth behind a lower minimum. Two quantities do not fluctuate so:
-//! the
-//! estimating equation, which at the true direction is zero but for the noise of its own few unknowns,
+//! against each other, the difference of `J` has the variance `4 sum sin^2 phi` in any case. Where depths
+//! are mostly noise, that hides the truth behind a lower minimum. Two quantities do not fluctuate so:
+//! the estimating equation, which at the true direction is zero but for the noise of its own few unknowns,
 //! however wrong its weights; and the depth map, which a wrong motion makes rough.
 
 use crate::ablation::keeps;

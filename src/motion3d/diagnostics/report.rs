@@ -201,8 +201,7 @@ pub(crate) fn with_all_inliers(mut found: MotionEstimate, all: &Observations, ke
 }
 
 /// Too few points to separate outliers from large noise, or from those that decide, make a motion doubtful
-/// that
-/// nothing worse is said against. That there is none, or too little of one, is said of the same doubtful
+/// that nothing worse is said against. That there is none, or too little of one, is said of the same doubtful
 /// choice of points and no surer; other statuses say more.
 ///
 /// A rotation alone is not doubted if it leaves one noise of all points, which is the shorter description of

@@ -1,4 +1,4 @@
-//! Scenes that do not determine a motion: no translation, one plane.
+//! Flow that a rotation alone explains, so that there is no translation to estimate.
 
 use crate::math::by_chance;
 use crate::motion3d::model::observations::{Observations, ROUNDING};

@@ -57,10 +57,9 @@ impl FieldPatches {
 /// Pixels whose windows overlap share their noise. The covariance of a patch is that of independent pixels
 /// times the number of its pixels over the number of disjoint windows in it, those of the area `58 l^2` over
 /// which errors of the correlation length `l` are one, their tail beyond the windows included (see
-/// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions)). Flow that is of no second order in
-/// a window,
-/// as over an edge in depth, shows in residuals that are larger than the pixels' covariances allow: by as
-/// much that of the patch grows.
+/// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions)). Flow that is not affine in a
+/// window, as over an edge in depth, shows in residuals that are larger than the pixels' covariances allow:
+/// by as much that of the patch grows.
 ///
 /// # Errors
 /// [`Error::Argument`] naming `field` for one without covariance, without a Jacobian or with a pixel pitch,

@@ -2,6 +2,9 @@
 //!
 //! It pays for few, large patches seen through a long lens; noisy slants used as weights make maximum
 //! likelihood worse than flow alone, so that they are shrunk.
+//!
+//! `derotation` takes the rotation out of displacements, `system` has the equations, `shrinkage` solves them
+//! with shrunk slants, `bootstrap` tests the covariance of few patches. `status` and `report` follow.
 
 mod bootstrap;
 mod derotation;
@@ -118,8 +121,8 @@ impl AffinePatches<'_> {
 /// The rigid motion that explains the affine flow of patches.
 ///
 /// As [`estimate_motion`](crate::motion3d::estimate_motion), with six numbers a patch: maximum likelihood;
-/// then, from 5
-/// patches on, inverse depths and their slopes in the weights drawn to their distribution over the patches.
+/// then, from 5 patches on, inverse depths and their slopes in the weights drawn to their distribution over
+/// the patches.
 /// Patches should be fits over windows of 30 px and more that do not overlap: numbers that share noise must
 /// come with covariances that say so. Other minima and opposite directions that no patch behind the camera
 /// excludes are reported as for points.

@@ -1,4 +1,16 @@
-//! Inliers of one motion among outliers.
+//! Inliers of one motion among outliers, in this order.
+//!
+//! * `search`: every direction with the best of many rotations; `graduated_weights` refines the best ones to
+//!   motions with many inliers. `noise_scale` estimates unknown noise from these inliers.
+//! * `competing_motions`: other motions with about as many inliers, and the choice among many outliers.
+//! * `depth_consistency`: inliers whose depth is that of their neighbours (`cells`); `outlier_posterior`: the
+//!   probability that an inlier is an outlier.
+//! * `moving_objects`: inliers with many rejected neighbours are left out.
+//! * `hidden_object`, `residual_structure`: whether it is two motions. The latter tests parts of the picture
+//!   (`regional_score`) and fits two motions to them (`two_motion_fit`).
+//!
+//! `single_noise` tests whether few points have outliers at all. `diagnostics` calls `mixture`, which weighs
+//! points by that probability, and `leverage`, which tests whether few points decide.
 
 mod cells;
 mod competing_motions;
@@ -59,7 +71,7 @@ const ROUNDS: usize = 10;
 /// Rounds towards the noise of few points.
 const FEW_ROUNDS: usize = 4;
 
-/// Times that the depth gate closes.
+/// Rounds of the depth-consistency test.
 const GATES: usize = 2;
 
 /// Share of outliers among the inliers from which on they matter for the search.
@@ -75,7 +87,8 @@ const MAJORITY: f64 = 0.1;
 /// What residuals that estimate noise are fewer by: the unknowns of a motion.
 const UNKNOWNS: usize = 5;
 
-/// Below so many points a few of them can agree by chance far better than the noise of all is: see [`whole`].
+/// Below so many points a few of them can agree by chance far better than the noise of all is: see
+/// [`single_noise`].
 const SELECTED: usize = 100;
 
 /// By how much, in nats, outliers must shorten the description of the residuals to be believed in, and to be
@@ -303,7 +316,7 @@ fn cheaper_sign(observations: &Observations, motion: Motion) -> (Motion, f64) {
     if signs[1].1 < signs[0].1 { signs[1] } else { signs[0] }
 }
 
-/// Points within three deviations of their epipolar line and of the half space before the camera.
+/// Points within three standard deviations of their epipolar line and of the half space before the camera.
 fn inliers_of(observations: &Observations, motion: &Motion) -> Vec<u32> {
     let seen = depths(observations, motion);
     let is_inlier = |&k: &u32| {

@@ -12,7 +12,7 @@ use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 /// Neighbours that decide with a point which motion it has: moving objects are connected.
 const NEAREST: usize = 8;
 
-/// What a point counts at most: neighbours across the border of a object do not decide.
+/// What a point counts at most: neighbours across the border of an object do not decide.
 const MAX_SQUARE: f64 = INLIER * INLIER;
 
 /// Times that points are given to the motion that they fit, and that both are searched again from all
@@ -20,7 +20,7 @@ const MAX_SQUARE: f64 = INLIER * INLIER;
 const ROUNDS: usize = 8;
 const SEARCHES: usize = 3;
 
-/// TwoMotionFit motions, that of more points first, and what each point leaves with its own, summed.
+/// Two motions, that of more points first, and what each point leaves with its own, summed.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TwoMotionFit {
     pub motions: [Motion; 2],
