@@ -1,6 +1,8 @@
 //! Kalman filters against each other, against statistics, and against numbers recorded from filterpy
 //! (`tests/golden/filters.py`).
 
+#![allow(clippy::unnecessary_wraps, reason = "models of a state space may fail")]
+
 use jacoflow::error::{Error, Result};
 use jacoflow::filter::{ExtendedFilter, GaussianState, KalmanFilter, SigmaPoints, UnscentedFilter};
 use jacoflow::math::random::CounterRng;
