@@ -2,8 +2,8 @@
 //!
 //! `rotation_only` and `planar_twin` recognise degenerate scenes. `solution` corrects the covariance, with
 //! `rotation_prior` and `correlated_noise`. `confidence_region` looks for other motions that explain the flow
-//! as well, from which `status` follows. `report` assembles the result, and `contact` computes times to
-//! contact from it.
+//! as well, from which `status` follows. `report` assembles the result, with times to contact from
+//! `contact`.
 
 pub(crate) mod confidence_region;
 pub(crate) mod contact;

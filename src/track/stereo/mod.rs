@@ -12,8 +12,8 @@
 //! * [`association`]: which track each component is, over time gaps of the [`clock`];
 //! * [`own_pixels`], [`grouping`], [`graph`], [`step`]: middles, objects, arcs and the result.
 //!
-//! [`tracker`] calls them with its [`options`]. All results refer to the left view: positions `(x, y)` px, disparity
-//! `d = x_left - x_right` (near is large), motion `(u, v)` px/step and `w` disparity/step.
+//! [`tracker`] calls them with its [`options`]. All results refer to the left view: positions `(x, y)` px,
+//! disparity `d = x_left - x_right` (near is large), motion `(u, v)` px/step and `w` disparity/step.
 //! [`StereoMode::Paper`] is the paper's text; [`StereoMode::Improved`] measures motion to fractions of a
 //! pixel first and carries the clusters along. Model and limits: `docs/stereo_tracker.md`.
 
