@@ -8,7 +8,10 @@
 //!
 //! Means, covariances and noise that are not finite, symmetric and positive semi-definite are refused by name
 //! at every step. Covariances stay so: updates use the Joseph form, and a matrix that loses that in a step is
-//! mended and counted in [`GaussianState::repairs`].
+//! repaired and counted in [`GaussianState::repairs`].
+//!
+//! `state` is what `kalman`, `extended` and `unscented` (with `sigma_points`) share; [`particle`] stands
+//! alone. `scalar` is the update by one number, for small states on the stack.
 //!
 //! ```
 //! use jacoflow::filter::{SigmaPoints, UnscentedFilter};

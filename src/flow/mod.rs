@@ -15,6 +15,9 @@
 //! * [`observability`]: which condition of theorem 1 holds at each pixel.
 //! * [`derived`]: divergence, curl, shear, rotation, time to contact, with their standard deviations.
 //! * [`advect`]: points moved by a field.
+//!
+//! `estimator` is the entry point; `methods` and `options` are its tables. What methods share: `site` (bands
+//! of sites), `moment_filter` (sums over windows), `symmetric` (6x6 matrices in lanes), `least_squares`.
 
 mod advect;
 pub mod baseline;

@@ -8,6 +8,11 @@
 //! semi-global matching of gradients along chains of edge pixels (after H. Hirschmueller, "Stereo processing
 //! by semiglobal matching and mutual information", 2008, with edge pixels in place of a dense grid), which
 //! wants the rows of the cameras aligned: [`estimate_row_offset`].
+//!
+//! `disparity` is the entry point. Views pass `edges` (edge pixels, classes of their gradients), then either
+//! `classes`, or `contrast` (different gains), `row_offset` (judged by `agreement`) and `align`, which calls
+//! `semi_global` (`cost` of two pixels, summed along `chains`) and `subpixel`. `sequence_rows` keeps the row
+//! offset of a sequence.
 
 mod agreement;
 mod align;

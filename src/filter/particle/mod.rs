@@ -9,6 +9,9 @@
 //! Random numbers are addressed by (seed, target, step, particle, component): results are bit-identical for
 //! any number of threads, and a batch entry has the same particles for any other entries.
 //!
+//! `state` holds the sets; `predict` (with `noise`), `update` (with `weights`) and `select` (with
+//! `resampling`) are the steps of the cycle, `estimates` what is read off.
+//!
 //! ```
 //! use jacoflow::filter::particle::{ParticleFilter, Resampling};
 //! # fn main() -> jacoflow::Result<()> {

@@ -7,7 +7,8 @@
 //!    by the present motion and sums windowed normal equations (rows 1 to 3 of WO2010/098160, (21)) at every
 //!    second pixel; [`regularize`] minimises data and robust smoothness terms together. [`resample`] carries
 //!    the motion to the next level.
-//! 3. [`refine`]: on the finest level, chooses at each site the window over which the motion is averaged.
+//! 3. [`refine`]: on the finest level, chooses at each site the window over which the motion is averaged;
+//!    three frames are warped by the result and refined once more.
 //! 4. [`peak_locking`]: measures and removes the bias of undersampled texture.
 //! 5. [`acceleration`]: three frames only; from the mean of both steps to the step after the middle frame.
 //! 6. [`covariance`]: error sources measured in the same frames.

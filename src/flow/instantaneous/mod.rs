@@ -7,6 +7,10 @@
 //! are wanted; pixels whose pivots are too small for its precision are done again in double precision, at
 //! last by the careful path. What is reported as unobservable is always the careful path's decision.
 //!
+//! `job` runs bands of rows with their `buffers`. The fast path: `dense` with `normal` (equations, solved by
+//! `blocks`); `detail` adds covariance and diagnostics (`uncertainty`, `propagation`, `lane_noise`,
+//! `condition`). `noise` is the careful path's covariance; `output` puts estimates in their places.
+//!
 //! Equations are formed per px and frame whatever the pixel pitch is, so that the pitch scales results and
 //! never changes a decision.
 

@@ -20,7 +20,8 @@
 //! matrix as a function of the jet), `high_frequencies` (the noise of the frames), `truncation` and
 //! `bias_planes` (biases of the equations and of flow that is not affine), `covariance` with
 //! `covariance_kernels` (sums over windows), `sandwich` (one row of covariances), `noise_dominated`
-//! (directions that only noise determines).
+//! (directions that only noise determines). `rows`, `noise`, `bias_planes` and `covariance` take all rows to
+//! have the same weight.
 //!
 //! # Pixels without data
 //! Samples that are NaN, infinite or masked invalidate every pixel whose jet (or smoothing) reaches them: NaN

@@ -1,7 +1,8 @@
 //! The loops over points, written once for every lane width.
 //!
 //! With `T = G u`, `s = |T|`, `d = f - R w`: `s e = T_y d_x - T_x d_y` is the residual across the epipolar
-//! line and `s m = T . d` the part along it (2).
+//! line and `s m = T . d` the part along it (2). `points` has single passes (depths, best rotation, truncated
+//! cost), `equations` the sums of a Gauss-Newton step, `weighted` the equation with given depths.
 
 use crate::motion3d::model::observations::PLANES;
 use crate::motion3d::model::rows::Matrix5;

@@ -1,4 +1,4 @@
-//! The filter's arithmetic, for lanes of pixels; the same source with one lane is the scalar twin.
+//! The filter's arithmetic, for lanes of pixels; the same source with one lane is the scalar reference.
 //!
 //! Per chunk of blocks three passes run one after the other: measurement, prediction, update. Each is a
 //! kernel of its own, so that the number of compiled variants is a sum, not a product.

@@ -6,7 +6,8 @@
 //! target. Their own loop is in `reference`, behind the feature of that name.
 //!
 //! A target starts with a box, or with what moves first (`start`, `detect`); then each frame passes the
-//! stages of `layered`, which filters the position by `gauss_markov`.
+//! stages of `layered`, which filters the position by `gauss_markov`. `options` are what it is given; `shift`
+//! (pictures between their pixels) and `noise` (robust statistics of brightness) serve all.
 
 mod detect;
 mod gauss_markov;

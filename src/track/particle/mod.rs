@@ -11,7 +11,8 @@
 //!   [`colour_table`]), [`evidence`] of tracks, [`likelihood`];
 //! * [`report`]: the result ([`step`]).
 //!
-//! [`record`] keeps a step, [`persist`] serialises it and the tracker. Model and limits:
+//! [`tracker`] calls them; [`options`], [`noise`] (numbers in which the modes differ) and [`geometry`]
+//! (boxes) serve all. [`record`] keeps a step, [`persist`] serialises it and the tracker. Model and limits:
 //! `docs/particle_tracker.md`.
 
 mod advance;

@@ -2,6 +2,7 @@
 //! target from the filter's prediction.
 //!
 //! `state` holds all that is known of the target; its parts are `pose`, `patch`, `layers` and `initial`.
+//! `oriented_box` is what the target may hide.
 //! A frame passes these stages:
 //!
 //! 1. `scene`: is the frame usable, in which `light`, and how did the `camera` move (`samples`, `nearby`)?
