@@ -61,8 +61,8 @@ pub struct LateralEstimate {
     pub bound: f64,
     /// Standard deviation of each component of the flow: as given, else estimated.
     pub noise_std: f64,
-    /// Inverse depths (N), the flow along the direction, in units of `|u|` per frame; their deviation is
-    /// `noise_std`. NaN where the flow is not finite.
+    /// Inverse depths (N), the flow along the direction, in units of `|u|` per frame; their standard
+    /// deviation is `noise_std`. NaN where the flow is not finite.
     pub inverse_depth: Vec<f64>,
 }
 
@@ -161,7 +161,7 @@ fn is_finite(flow: &[f64; 2]) -> bool {
     flow.iter().all(|value| value.is_finite())
 }
 
-/// The sign of an axis that leaves less behind the camera, in squared deviations.
+/// The sign of an axis that leaves less behind the camera, in squared standard deviations.
 fn in_front(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
     let (mut plus, mut minus) = (0.0, 0.0);
     for f in flow.iter().filter(|f| is_finite(f)) {
@@ -175,9 +175,9 @@ fn in_front(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
 /// at N points wherever they are.
 ///
 /// `flow`: per frame on the plane at distance 1, or px/frame of a camera with square pixels; each component
-/// has the deviation `noise_std`, which is estimated from the flow across the direction where it is `None`.
-/// Flow that is not finite is left out. (29) and (31) are of first order: they hold while they are small
-/// beside a radian.
+/// has the standard deviation `noise_std`, which is estimated from the flow across the direction where it is
+/// `None`. Flow that is not finite is left out. (29) and (31) are of first order: they hold while they are
+/// small beside a radian.
 ///
 /// # Errors
 /// [`Error::Argument`] for a `noise_std` that is none and for a `flow` of fewer than two finite vectors (one
@@ -218,7 +218,7 @@ pub fn estimate_lateral(flow: &[[f64; 2]], noise_std: Option<f64>, weights: Late
 /// depths: for the design of an experiment.
 ///
 /// `inverse_depth`: `nu` (N) in units of `|u|` per frame; those that are not finite are left out.
-/// `noise_std`: deviation of each component of the flow, in the same unit.
+/// `noise_std`: standard deviation of each component of the flow, in the same unit.
 ///
 /// # Errors
 /// [`Error::Argument`] for a `noise_std` that is none, and an `inverse_depth` without a finite value;

@@ -30,7 +30,7 @@ pub(crate) const PLAUSIBLE: f64 = 11.07;
 /// That with two: of the equations for a direction, once the rotation suits it.
 const CONSISTENT: f64 = 5.99;
 
-/// Deviations that chance may add to a difference of `J`.
+/// Standard deviations that chance may add to a difference of `J`.
 pub(crate) const CHANCE: f64 = 2.0;
 
 /// Depth maps whose costs differ by less than this times `sqrt(n)` are as smooth.
@@ -60,7 +60,7 @@ pub(crate) struct TestedDirection {
 
 /// Whether any direction of the half sphere, farther from that of the first of `motions` (the estimate),
 /// explains the flow of `most` points as well as the best of these, depth signs included. A covariance is
-/// that of one minimum; a valley of minima shows here.
+/// that of one minimum; a whole line of minima shows here.
 pub(crate) fn plausible_beyond(
     observations: &Observations,
     motions: &[Motion],

@@ -44,7 +44,7 @@ impl Slopes {
 }
 
 impl Rates {
-    /// Without a covariance, deviations are NaN.
+    /// Without a covariance, standard deviations are NaN.
     pub fn new(of: &UncertainMotion) -> Self {
         let covariance = Matrix5::from_fn(|i, j| of.covariance[i][j]) - of.common.added();
         let tangent = Matrix2x3::from_fn(|i, j| of.tangent[i][j]);
@@ -181,7 +181,7 @@ mod tests {
     use crate::motion3d::{Motion, MotionOptions, Noise, estimate_motion};
     use crate::types::{FieldLayout, MOTION_NAMES, SamplingGrid};
 
-    /// The same depth everywhere, seen by a camera of 100 px, with deviations of 0.05 px.
+    /// The same depth everywhere, seen by a camera of 100 px, with standard deviations of 0.05 px.
     fn wall(motion: &Motion, nu: f64, camera: &Intrinsics) -> FlowField<f64> {
         let layout = FieldLayout {
             frame_size: (64, 48),
@@ -228,7 +228,7 @@ mod tests {
         assert!(exact.contact[5].is_nan() && exact.residual[100].abs() > 3.0);
         let corner = 0;
         assert!((exact.contact[corner] - 50.0).abs() < 1e-6 && exact.residual[corner].abs() < 1e-9);
-        // nu = 1/50 with the deviation 0.0005 / s at s = 0.4.
+        // nu = 1/50 with the standard deviation 0.0005 / s at s = 0.4.
         assert!((exact.deviation[corner] - 50.0 * 50.0 * 5e-4 / 0.4).abs() < 1e-3, "{}", exact.deviation[corner]);
         covariance[3][3] = 1e-6;
         let unsure = map(motion, covariance);
@@ -269,7 +269,7 @@ mod tests {
         }
     }
 
-    /// Where depths are smoothed their deviations are smaller than those of single points, and hold.
+    /// Where depths are smoothed their standard deviations are smaller than those of single points, and hold.
     #[test]
     fn deviations_are_those_of_the_smoothed_depths() {
         let motion = Motion::new([0.35, 0.25, 1.0], [0.02, -0.03, 0.01]);

@@ -136,8 +136,8 @@ pub(crate) const FEW: usize = 1000;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PlanarTwin {
     pub motion: Motion,
-    /// Squared depths behind the camera, in units of their deviation, that it has, and how far it is from a
-    /// known rotation.
+    /// Squared depths behind the camera, in units of their standard deviation, that it has, and how far it is
+    /// from a known rotation.
     pub behind: f64,
 }
 

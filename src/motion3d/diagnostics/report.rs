@@ -95,8 +95,8 @@ fn likeliest(out: &MotionEstimate, inliers: &Observations, solution: &Solution) 
     depths
 }
 
-/// Times to contact with their deviations, by first order from those of the depth and of the motion; and the
-/// rate of approach of all inliers together.
+/// Times to contact with their standard deviations, by first order from those of the depth and of the motion;
+/// and the rate of approach of all inliers together.
 fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations, seen: &Depths, solution: &Solution) {
     let rates = Rates::new(&out.uncertain());
     let likeliest = likeliest(out, inliers, solution);
@@ -228,6 +228,6 @@ pub(crate) fn of_estimated_noise(points: usize, cut: bool) -> f64 {
     free / (free - 2.0)
 }
 
-/// The information about a variance that is left where residuals beyond 2.5 deviations are cut off and the
-/// points chosen by it: 0.69 by the cut alone.
+/// The information about a variance that is left where residuals beyond 2.5 standard deviations are cut off
+/// and the points chosen by it: 0.69 by the cut alone.
 pub(crate) const TOLD_BY_CUT: f64 = 0.6;

@@ -23,16 +23,17 @@ const FEW: usize = 12;
 /// Standard deviation of the direction, degrees, beyond which it is not known.
 pub(crate) const WIDE: f64 = 20.0;
 
-/// Plausible directions reach 3.3 deviations where the covariance is right; those looked at are
+/// Plausible directions reach 3.3 standard deviations where the covariance is right; those looked at are
 /// [`SPACING`] degrees apart, half of that from one of them.
 pub(crate) const FAR: f64 = 4.0;
 pub(crate) const SPACING: f64 = 4.0;
 
-/// The same in the estimate's own deviations, for directions that the smoothed weights do not exclude.
+/// The same in the estimate's own standard deviations, for directions that the smoothed weights do not
+/// exclude.
 const CONSISTENT: f64 = 3.0;
 
-/// How many times the estimate's own deviation that of maximum likelihood may count: where it is larger
-/// still, it is the valley that is looked for.
+/// How many times the estimate's own standard deviation that of maximum likelihood may count: where it is
+/// larger still, other directions are what is looked for.
 const MAX_LIKELIHOOD_RATIO: f64 = 1.5;
 
 /// Most points that are tested again where few leave a doubt.
@@ -41,12 +42,13 @@ const ASKED_AGAIN: usize = 16_000;
 /// The angle, degrees, beyond which few points are not tested.
 const BLIND: f64 = 20.0;
 
-/// Squared depths behind the camera, in units of their deviation, that exclude the other motion of a plane.
+/// Squared depths behind the camera, in units of their standard deviation, that exclude the other motion of a
+/// plane.
 const EXCLUDED: f64 = 25.0;
 
 /// What else speaks for or against a motion.
 pub(crate) struct Evidence<'a> {
-    /// Maximum likelihood's motion, and its depths behind the camera in squared deviations.
+    /// Maximum likelihood's motion, and its depths behind the camera in squared standard deviations.
     pub likelihood: (Motion, f64),
     /// Standard deviation of maximum likelihood's direction, degrees; 0 where it is not known.
     pub deviation: f64,
@@ -151,12 +153,12 @@ fn planar(
 }
 
 /// Whether directions explain the flow as well as the estimate that are farther than the covariance has it:
-/// in a valley that bends or widens, that of its lowest point is too small.
+/// where the cost along a line of directions is curved, the covariance at the minimum is too small.
 ///
-/// `own` and `likelihood`: deviations of the estimate and of maximum likelihood, whose residuals are looked
-/// at; of the points that the search sees they are that much larger. Where few of many points leave a doubt,
-/// [`ASKED_AGAIN`] of them are tested: with noisy depths the deviation of the few grows faster than by the
-/// root of their number.
+/// `own` and `likelihood`: standard deviations of the estimate and of maximum likelihood, whose residuals are
+/// looked at; of the points that the search sees they are that much larger. Where few of many points leave a
+/// doubt, [`ASKED_AGAIN`] of them are tested: with noisy depths the standard deviation of the few grows
+/// faster than by the root of their number.
 fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rng: CounterRng) -> bool {
     let beyond = |most: usize| {
         let fewer = (inliers.n as f64 / inliers.n.min(most) as f64).sqrt();
@@ -165,7 +167,7 @@ fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rn
     if inliers.n <= SEARCHED {
         return beyond(SEARCHED);
     }
-    // Where the deviation of few is too large for anything to lie beyond it, these decide nothing.
+    // Where the standard deviation of few is too large for anything to lie beyond it, these decide nothing.
     let blind = CONSISTENT * own * (inliers.n as f64 / SEARCHED as f64).sqrt() > BLIND;
     (blind || beyond(SEARCHED)) && beyond(ASKED_AGAIN)
 }
@@ -183,7 +185,7 @@ fn otherwise_turned(
     plausible_less_turned(whitening, inliers, &solution.motion, farther, ASKED_AGAIN, rng)
 }
 
-/// What is farther than a covariance has it, of points whose deviations are `fewer` times larger.
+/// What is farther than a covariance has it, of points whose standard deviations are `fewer` times larger.
 fn farther(own: f64, likelihood: f64, fewer: f64) -> Farther {
     Farther {
         residuals: FAR * own.max(likelihood.min(MAX_LIKELIHOOD_RATIO * own)) * fewer + SPACING,
@@ -220,7 +222,8 @@ pub(crate) const STEPS: usize = 30;
 
 pub(crate) const STEP: f64 = 1e-7;
 
-/// Squared deviations by which the opposite must be worse to be excluded: a chance of about 1 in 100.
+/// Squared standard deviations by which the opposite must be worse to be excluded: a chance of about 1 in
+/// 100.
 pub(crate) const SURE: f64 = 9.0;
 
 /// The most likely motion near `start` that has no depth behind the camera, and its cost.

@@ -143,7 +143,7 @@ mod tests {
     fn common_errors_are_estimated_from_the_sharpest_points() {
         let point = |length: f64| (Vector2::new(length, 0.0), Matrix2::identity() * 0.04);
         let common = common_errors_of([1.0, 4.0, 9.0].into_iter().map(point));
-        // A flow of 45 deviations, and one point's of 0.2.
+        // A flow of 45 standard deviations, and one point's of 0.2.
         assert!((common.scale - (2.0f64 / 2025.0).sqrt()).abs() < 1e-12, "{common:?}");
         assert!((common.offset - BIAS_PER_NOISE * 0.2).abs() < 1e-12, "{common:?}");
         assert_eq!(common_errors_of(std::iter::empty()).scale, 1.0);

@@ -27,8 +27,9 @@ pub(crate) const ROUNDING: f64 = 1e-11;
 const MAX_RATIO_POINTS: usize = 1000;
 const FAR_FROM_ROUND: f64 = 0.9;
 
-/// Ratios of a point's deviations along its two axes at which minima are looked for one after the other,
-/// where the points' own are larger: the smaller a point's noise along one axis, the narrower its valley.
+/// Ratios of a point's standard deviations along its two axes at which minima are looked for one after the
+/// other, where the points' own are larger: the smaller a point's noise along one axis, the narrower
+/// the minimum.
 const RATIOS: [f64; 3] = [6.0, 24.0, 96.0];
 
 /// By how much residuals may grow from one of these to the next.
@@ -192,7 +193,7 @@ impl Observations {
     }
 
     /// The same points where no point's noise is more than `ratio` times as large along one axis as along the
-    /// other: the smaller deviation is taken to be larger.
+    /// other: the smaller standard deviation is taken to be larger.
     fn rounded(&self, ratio: f64) -> Self {
         let mut out = self.clone();
         for k in 0..self.n {
@@ -220,7 +221,7 @@ impl Observations {
         self.units *= factor;
     }
 
-    /// The deviation of a point's own error, in units of noise.
+    /// The standard deviation of a point's own error, in units of noise.
     pub fn own(&self) -> f64 {
         self.points_per_independent_sample.sqrt().recip()
     }

@@ -203,9 +203,10 @@ pub(crate) type Moved = SMatrix<f64, 5, 2>;
 pub struct CommonEffect {
     /// Standard deviation of the factor.
     pub scale: f64,
-    /// Displacements of one deviation along both axes of the picture, on the plane at distance 1.
+    /// Displacements of one standard deviation along both axes of the picture, on the plane at distance 1.
     pub displaced: [[f64; 2]; 2],
-    /// What one deviation of the factor and each of these displacements do to `(psi, w)`, rad and rad/frame.
+    /// What one standard deviation of the factor and each of these displacements do to `(psi, w)`, rad and
+    /// rad/frame.
     pub motion: [[f64; 5]; 3],
 }
 
@@ -220,7 +221,7 @@ impl CommonEffect {
         }
     }
 
-    /// What displacements of one deviation do to the motion.
+    /// What displacements of one standard deviation do to the motion.
     fn moves(&self) -> [Vector5; 3] {
         self.motion.map(SVector::from)
     }

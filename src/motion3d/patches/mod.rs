@@ -60,7 +60,7 @@ const SEARCHED: usize = 200;
 const STARTS: usize = 5;
 const APART: f64 = 12.0;
 
-/// By how much a covariance may have to be widened for it to describe the shape of the confidence region.
+/// By how much a covariance may have to be inflated for it to describe the shape of the confidence region.
 const NONLINEAR: f64 = 4.0;
 
 impl AffinePatches<'_> {

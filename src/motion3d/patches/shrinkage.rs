@@ -10,8 +10,8 @@ const ROUNDS: usize = 3;
 const EXPECTATIONS: usize = 60;
 const STEPS: usize = 60;
 
-/// The length of a step that is the last, or its square in units of the motion's deviation; and the farthest
-/// that the direction may come, degrees.
+/// The length of a step that is the last, or its square in units of the motion's standard deviation; and the
+/// farthest that the direction may come, degrees.
 const STEP: f64 = 1e-9;
 const NEGLIGIBLE: f64 = 1e-8;
 const FARTHEST: f64 = 30.0;

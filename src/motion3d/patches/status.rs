@@ -12,13 +12,13 @@ use crate::motion3d::solver::covariance::direction_deviation;
 use crate::motion3d::solver::starts::{evaluate, sample};
 use nalgebra::Vector3;
 
-/// Squared deviations by which the opposite must be worse to be excluded, and what other minima, whose
-/// residuals are other components of the noise, may differ by through chance: this times the root of their
-/// number.
+/// Squared standard deviations by which the opposite must be worse to be excluded, and what other minima,
+/// whose residuals are other components of the noise, may differ by through chance: this times the root of
+/// their number.
 const SURE: f64 = 9.0;
 const CHANCE: f64 = 1.0;
 
-/// Motions nearer than so many deviations, or degrees, are one.
+/// Motions nearer than so many standard deviations, or degrees, are one.
 const DISTINCT: f64 = 3.0;
 const APART: f64 = 3.0;
 

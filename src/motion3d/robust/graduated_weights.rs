@@ -15,7 +15,7 @@ const SPACING: f64 = 0.06;
 /// What the cut of Tukey's weights is divided by from one refinement to the next.
 const NARROWING: f64 = 1.6;
 
-/// The same points, with rounder noise first: where it is far from round the valleys are too narrow for the
+/// The same points, with rounder noise first: where it is far from round minima are too narrow for the
 /// search.
 pub(crate) struct GraduatedWeights<'a> {
     rounder: Vec<Observations>,

@@ -17,15 +17,15 @@ const MANY: usize = 300;
 /// The share of cases in which no more outliers than assumed fit by chance.
 const SURE: f64 = 0.95;
 
-/// By how much the deviation may grow without the points that may be outliers.
+/// By how much the standard deviation may grow without the points that may be outliers.
 const MAX_GROWTH: f64 = 2.0;
 
 use crate::motion3d::model::rows::Vector5;
-/// Whether the direction's deviation would more than double without the inliers of the highest leverage, as
-/// many as outliers may fit by chance.
+/// Whether the direction's standard deviation would more than double without the inliers of the highest
+/// leverage, as many as outliers may fit by chance.
 ///
 /// Outliers spread evenly have twice the median residual of the rejected as their range; `3 / (2 median)` of
-/// them fall within three deviations.
+/// them fall within three standard deviations.
 pub(crate) fn has_high_leverage(observations: &Observations, found: &MotionEstimate) -> bool {
     let inliers: Vec<usize> = (0..observations.n).filter(|&k| found.inliers[observations.source[k] as usize]).collect();
     let rejected = observations.n - inliers.len();

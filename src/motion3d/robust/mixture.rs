@@ -18,11 +18,11 @@ use crate::motion3d::solver::covariance::{direction_spread, inverse};
 use nalgebra::{Matrix2, Matrix2x3, Vector2};
 use rayon::prelude::*;
 
-/// Most Newton steps, and the square of one, in deviations, that is the last.
+/// Most Newton steps, and the square of one, in standard deviations, that is the last.
 const STEPS: usize = 10;
 const STEP: f64 = 0.01;
 
-/// The square of all of them, in deviations, from which on the steps lead to another motion.
+/// The square of all of them, in standard deviations, from which on the steps lead to another motion.
 const FARTHEST: f64 = 11.0;
 
 /// The longest step, rad: beyond that other points are inliers.

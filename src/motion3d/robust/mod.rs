@@ -91,7 +91,7 @@ const UNKNOWNS: usize = 5;
 /// [`single_noise`].
 const SELECTED: usize = 100;
 
-/// By how much, in nats, outliers must shorten the description of the residuals to be believed in, and to be
+/// By how much, in nats, outliers must shorten the description of the residuals to be accepted, and to be
 /// sure; the factor between both noises that makes a difference.
 const WORTH: f64 = 4.0;
 const SURE: f64 = 10.0;
@@ -100,7 +100,7 @@ const APART_NOISE: f64 = 1.5;
 /// By how much, in nats, outliers must lengthen that for there to be none.
 const LONGER: f64 = 1.0;
 
-/// Inliers below which a selection of them, whose noise is not known either, is not believed in.
+/// Inliers below which a selection of them, whose noise is not known either, is not accepted.
 const FEWEST: usize = 20;
 
 /// A motion and its inliers.

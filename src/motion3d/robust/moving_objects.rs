@@ -13,7 +13,7 @@ const MIN_WITH_NEIGHBOURS: usize = 64;
 /// Rejected points below which no point has more of them around it than is usual.
 const MIN_REJECTED: usize = 4;
 
-/// Deviations by which rejected neighbours must be more than usual.
+/// Standard deviations by which rejected neighbours must be more than usual.
 const MORE: f64 = 3.0;
 
 /// Times that points are left out and the rest is looked at again.

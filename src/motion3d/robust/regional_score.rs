@@ -16,7 +16,7 @@ use std::ops::Range;
 const PART: usize = 16;
 const MIN_PART: usize = 8;
 
-/// Deviations by which one of about thirty parts differs in one of a hundred pictures by chance.
+/// Standard deviations by which one of about thirty parts differs in one of a hundred pictures by chance.
 const FAR: f64 = 3.4;
 
 /// Information about a combination of the unknowns that a part has of its own, as a share of all; less is
@@ -58,7 +58,8 @@ fn tested_parts(observations: &Observations, motion: &Motion, points: &[u32]) ->
     Some(far.into_iter().map(|(_, places)| tree.order()[places].to_vec()).collect())
 }
 
-/// How far the `pull` of a part that has the `share` of all information is from noise, in deviations.
+/// How far the `pull` of a part that has the `share` of all information is from noise, in standard
+/// deviations.
 fn score_deviation(share: Matrix5, pull: &Vector5, variance: f64) -> f64 {
     if !share.iter().chain(pull).all(|value| value.is_finite()) {
         return 0.0;
@@ -88,7 +89,7 @@ mod tests {
         for seed in 0..200 {
             let mut scene = Scene::oblique(400, 0.02, seed);
             chance += u32::from(!deviating_parts(&scene.observations(), &oblique(), &all).is_empty());
-            // Two deviations of a point, most of which passes for depth.
+            // Two standard deviations of a point, most of which passes for depth.
             let turned = Motion::new(oblique().translation, W.map(|w| 2.0 * w));
             for k in (0..400).filter(|&k| scene.points[k][0] > 0.3) {
                 let (nu, at) = (scene.inverse_depth[k], scene.points[k]);

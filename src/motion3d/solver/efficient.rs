@@ -82,8 +82,8 @@ impl WeightDepths<'_> {
     }
 }
 
-/// Deviations above zero of the factor between known depths and those of the flow, below which they have
-/// nothing to do with each other.
+/// Standard deviations above zero of the factor between known depths and those of the flow, below which they
+/// have nothing to do with each other.
 const RELATED: f64 = 3.0;
 
 /// Solves `sum V(nu~)^t (s e)(u, w) = 0` (19), (25) from `start`; `None` where a solution fails or leads far
@@ -201,7 +201,8 @@ fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> Option<Moti
     None
 }
 
-/// By how much the deviation of (17) must be above the bound's for the noise of the depths to matter.
+/// By how much the standard deviation of (17) must be above the bound's for the noise of the depths to
+/// matter.
 pub(crate) const NOISY: f64 = 1.3;
 
 /// Whether (17) cannot be trusted: the noise of the depths matters, and the epipole may lie among the points.

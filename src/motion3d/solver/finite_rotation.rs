@@ -3,7 +3,7 @@
 //! Half way between both ends a displacement is the instantaneous flow to second order. The rest, of third
 //! order in rotation and translation, is in no covariance; rows that have the motion's own rotation taken out
 //! of them ([`derotation`](crate::motion3d::model::derotation)) have none. Where the rest would move an
-//! estimate by a small share of its deviation, nothing is turned.
+//! estimate by a small share of its standard deviation, nothing is turned.
 
 use super::likelihood::different;
 use super::refine::{Minimum, StoppingCriteria, refine};
@@ -24,7 +24,7 @@ use std::borrow::Cow;
 const SAMPLED: usize = 256;
 const FIRST: usize = 200;
 
-/// Squared shift of an estimate, in its deviations, that is negligible.
+/// Squared shift of an estimate, in its standard deviations, that is negligible.
 const NEGLIGIBLE: f64 = 0.01;
 
 /// The same once rows are turned anyway: of [`MANY`] points another round costs more than it gains; and the
@@ -34,8 +34,8 @@ const ROUGHLY: f64 = 1e-3;
 const MANY: usize = 10_000;
 const ROUNDING: f64 = 1e-13;
 
-/// What a rest may add to squared residuals, in deviations of their sum by chance, before anything is known
-/// of the motion.
+/// What a rest may add to squared residuals, in standard deviations of their sum by chance, before anything
+/// is known of the motion.
 const HIDDEN: f64 = 0.1;
 
 /// Root mean square of the rest, in units of noise, that changes few inliers.

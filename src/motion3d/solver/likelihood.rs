@@ -158,7 +158,7 @@ pub(crate) const TRIED: usize = 3;
 /// are as likely.
 pub(crate) const UNDECIDED: f64 = 1.5;
 
-/// Solutions nearer than so many deviations are one.
+/// Solutions nearer than so many standard deviations are one.
 pub(crate) const DISTINCT: f64 = 3.0;
 
 /// The likeliest solution, and another that is about as likely.

@@ -5,8 +5,8 @@
 //! better than one that is right. So the confidence interval of that one unknown is looked for where it ends:
 //! where the estimating equation, with weights smoothed *there* and the other unknowns solved for, is off by
 //! as much as chance makes it in one case of twenty (C. Rao's score test, 1948, which needs the truth of the
-//! place only, not an estimate there). The deviation that has these ends is reported, with the bend of the
-//! valley that they show, and with what the other unknowns are known to there.
+//! place only, not an estimate there). The standard deviation that has these ends is reported, with the
+//! curvature of the profile that they show, and with what the other unknowns are known to there.
 
 use super::covariance::{damping, direction_block, direction_deviation, inverse};
 use crate::motion3d::kernels::{Bilinear, information};
@@ -15,8 +15,8 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
 use nalgebra::{Matrix2x3, Matrix4, SMatrix, SymmetricEigen, Vector2, Vector3};
 
-/// Deviations of the direction, as shares of the field, below which the theory is linear enough; that where
-/// the epipole may lie among the points.
+/// Standard deviations of the direction, as shares of the field, below which the theory is linear enough;
+/// that where the epipole may lie among the points.
 const STRAIGHT: f64 = 0.08;
 const STRAIGHT_AMONG: f64 = 0.03;
 
@@ -35,18 +35,19 @@ const LONGEST: f64 = 2.0;
 /// The farthest that is looked, rad: farther the direction is not known.
 const FARTHEST: f64 = 1.5;
 
-/// The direction's deviation as a share of the field beyond which no covariance describes the shape of the
-/// valley, whose every bend counts.
+/// The direction's standard deviation as a share of the field beyond which no covariance describes the shape
+/// of the profile, whose every bend counts.
 const BEYOND: f64 = 1.5;
 
-/// Most steps towards the valley's floor, and the length of one that is the last, rad.
+/// Most steps towards the profile's minimum, and the length of one that is the last, rad.
 const STEPS: usize = 15;
 const STEP: f64 = 1e-9;
 
 /// Mean fourth power of a normal variable of variance 1.
 const KURTOSIS: f64 = 3.0;
 
-/// Weight of each end in a mean over the valley (Simpson's rule, whose ends lie at `sqrt 3` deviations).
+/// Weight of each end in a mean over the profile (Simpson's rule, whose ends lie at `sqrt 3` standard
+/// deviations).
 const SIMPSON: f64 = 1.0 / 6.0;
 
 type Vector4 = SMatrix<f64, 4, 1>;
@@ -57,8 +58,8 @@ pub(crate) struct ProfileLikelihood<'a> {
     pub tangent: &'a Matrix2x3<f64>,
 }
 
-/// Where a valley is gone along from: the axes, the first of which is the valley's, the line that the others
-/// follow by the covariance, and what damps weights near the epipole.
+/// Where a profile begins: the axes, the first of which is the profile's, the line that the others follow by
+/// the covariance, and what damps weights near the epipole.
 struct Course<'a> {
     axes: &'a Matrix2x3<f64>,
     slope: Vector4,
@@ -84,20 +85,20 @@ impl ProfileLikelihood<'_> {
         if !share.is_finite() {
             return 0;
         }
-        // Noise that is small along one axis makes a valley as narrow as the angle to that axis.
+        // Noise that is small along one axis makes a profile as narrow as the angle to that axis.
         let narrower = (self.observations.longest() / ROUND).max(1.0);
         let inside = || narrower > 1.0 || among(self.observations, self.motion, deviation);
         match share * narrower {
-            // Where the epipole may lie among the points each axis is a valley.
+            // Where the epipole may lie among the points each axis needs a profile.
             share if share > STRAIGHT_AMONG && inside() => 2,
             share if share > STRAIGHT => 1,
             _ => 0,
         }
     }
 
-    /// The covariance with what a curved and widening valley adds; the same where the direction is known well
-    /// beside the field. `weights`: the depths that weigh the equations at a motion. And whether that
-    /// describes the valley: it has ends, and is not so long that a covariance has none of its shape.
+    /// The covariance with what a curved and widening profile adds; the same where the direction is known
+    /// well beside the field. `weights`: the depths that weigh the equations at a motion. And whether that
+    /// describes the profile: it has ends, and is not so long that a covariance has none of its shape.
     pub fn lengthened(&self, covariance: &Matrix5, mut weights: impl FnMut(&Motion) -> Vec<f64>) -> (Matrix5, bool) {
         let axes = self.bent(covariance);
         let (mut out, mut described) = (*covariance, true);
@@ -278,7 +279,7 @@ fn spread(points: &[[f64; 3]]) -> f64 {
     (few().map(|at| (at - middle).norm_squared()).sum::<f64>() / n).sqrt()
 }
 
-/// Deviations of the direction within which the epipole may lie.
+/// Standard deviations of the direction within which the epipole may lie.
 pub(crate) const REACH: f64 = 3.0;
 
 /// Whether the epipole may lie among the points, of a direction known to `deviation` degrees.

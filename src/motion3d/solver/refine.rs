@@ -17,7 +17,7 @@ pub(crate) struct StoppingCriteria {
     pub steps: usize,
     /// Length of a step `(psi, w)`, rad, that is not worth another.
     pub tolerance: f64,
-    /// The same in deviations of what is found, estimated from its residuals.
+    /// The same in standard deviations of what is found, estimated from its residuals.
     pub deviations: f64,
 }
 
@@ -30,7 +30,7 @@ impl StoppingCriteria {
     pub const FULL: Self = Self { steps: 60, tolerance: 1e-10, deviations: 0.0 };
 
     /// To the minimum of `n` points: of many a step costs much, and after one that is short beside the
-    /// deviation little is left.
+    /// standard deviation little is left.
     pub const fn of(n: usize) -> Self {
         if n > MANY { Self { deviations: 1e-3, ..Self::FULL } } else { Self::FULL }
     }
@@ -65,7 +65,7 @@ fn step(equations: &Equations, damping: f64) -> Option<Vector5> {
     step.iter().all(|value| value.is_finite()).then_some(step)
 }
 
-/// The square of a step in deviations of what is found, estimated from residuals of `n` points.
+/// The square of a step in standard deviations of what is found, estimated from residuals of `n` points.
 fn squared_deviations(equations: &Equations, step: &Vector5, n: usize) -> f64 {
     step.dot(&(equations.h * step)) * n as f64 / equations.cost
 }

@@ -75,9 +75,9 @@ pub struct EgomotionPlan {
 }
 
 /// Writes, for each field, the rigid motion of the scene relative to the camera: direction `u` and rotation
-/// rate `w` (rad/frame) with their deviations, the focus of expansion (px), and the rate `nu u_z` (1/frame)
-/// and time to contact (frames) of all points together, and the Cramér-Rao bound; other motions that explain
-/// the flow as well into a table of their own.
+/// rate `w` (rad/frame) with their standard deviations, the focus of expansion (px), and the rate `nu u_z`
+/// (1/frame) and time to contact (frames) of all points together, and the Cramér-Rao bound; other motions
+/// that explain the flow as well into a table of their own.
 #[derive(Debug)]
 pub struct Egomotion {
     plan: EgomotionPlan,
@@ -164,7 +164,7 @@ impl Egomotion {
         Ok(())
     }
 
-    /// Times to contact of all sites with their deviations and residuals.
+    /// Times to contact of all sites with their standard deviations and residuals.
     fn map<T: Real>(&mut self, field: &FlowField<T>, found: &MotionEstimate) -> Result<()> {
         let Some(folder) = &self.plan.maps else { return Ok(()) };
         let map = contact_map(field, &self.plan.camera, &found.uncertain(), self.plan.motion.placement)?;
@@ -182,13 +182,13 @@ impl Egomotion {
     }
 }
 
-/// Deviations of the bound: of the direction, degrees, and of the rotation, rad/frame.
+/// Standard deviations of the bound: of the direction, degrees, and of the rotation, rad/frame.
 fn bound_deviations(bound: &[[f64; 5]; 5]) -> [f64; 4] {
     let deviation = |i: usize| bound[i][i].sqrt();
     [deviation(0).hypot(deviation(1)).to_degrees(), deviation(2), deviation(3), deviation(4)]
 }
 
-/// `-1 / rate` with its deviation; infinite without an approach.
+/// `-1 / rate` with its standard deviation; infinite without an approach.
 fn time_to_contact(rate: f64, deviation: f64) -> (f64, f64) {
     if rate == 0.0 { (f64::INFINITY, f64::INFINITY) } else { (-1.0 / rate, deviation / (rate * rate)) }
 }

@@ -47,9 +47,10 @@ pub struct MovingTarget {
 
 /// Finds what moves between two frames of a still scene: the largest object, or that nearest to a point.
 ///
-/// Changed pixels differ by three deviations of the noise and have changed neighbours. The displacement
-/// within 10 px along each axis is the smallest that explains them nearly best, as what came or as what went;
-/// the box is the extent of the changed pixels less the displacement. `None` where nothing moves.
+/// Changed pixels differ by three standard deviations of the noise and have changed neighbours. The
+/// displacement within 10 px along each axis is the smallest that explains them nearly best, as what came or
+/// as what went; the box is the extent of the changed pixels less the displacement. `None` where nothing
+/// moves.
 pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Option<[f64; 2]>) -> Option<MovingTarget> {
     if first.size() != second.size() {
         return None;

@@ -39,7 +39,7 @@ pub(crate) struct Errors {
 }
 
 impl Errors {
-    /// `inverse`: that of the equations' information; `own`: the deviation of a point's own error.
+    /// `inverse`: that of the equations' information; `own`: the standard deviation of a point's own error.
     ///
     /// Fitting a motion takes what looks like one out of the residuals: of errors with the correlations `R`
     /// they have the covariance `(I - H) R (I - H)^t`, `H = W A^-1 W^t`. The shortest stretch is taken for

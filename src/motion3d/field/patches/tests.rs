@@ -8,14 +8,14 @@ use crate::types::FieldLayout;
 
 const FOCAL: f64 = 500.0;
 
-/// Deviations of the flow, px, and of its slopes, 1/frame, at each pixel.
+/// Standard deviations of the flow, px, and of its slopes, 1/frame, at each pixel.
 const NOISE: [f64; 6] = [0.06, 0.06, 0.006, 0.006, 0.006, 0.006];
 
 fn camera() -> Intrinsics {
     Intrinsics::pinhole((FOCAL, FOCAL), (160.0, 120.0)).unwrap()
 }
 
-/// A field of 320 x 240 px whose six numbers at each pixel are given, with the deviations `NOISE`.
+/// A field of 320 x 240 px whose six numbers at each pixel are given, with the standard deviations `NOISE`.
 fn field(stride: usize, length: f64, six: impl Fn(f64, f64) -> [f64; 6]) -> FlowField<f64> {
     let layout = FieldLayout {
         frame_size: (320, 240),
@@ -119,14 +119,14 @@ fn a_window_over_an_edge_is_told_less_surely() {
     let step = |x: f64, _: f64| if x < 30.0 { [3.0, 0.0, 0.0, 0.0, 0.0, 0.0] } else { [2.0, 0.0, 0.0, 0.0, 0.0, 0.0] };
     let found = field_patches(&field(1, 0.0, step), 60, None).unwrap();
     let variance = |k: usize| found.covariances[36 * k];
-    // A third of the window moves by another pixel, 16 deviations of its noise.
+    // A third of the window moves by another pixel, 16 standard deviations of its noise.
     let off = (found.motion[0][0] - 3.0).abs();
     assert!(variance(0) > 3.0 * variance(1), "{} {}", variance(0), variance(1));
     assert!(off < 1.0 && (found.motion[1][0] - 2.0).abs() < 1e-9, "{off}");
 }
 
-/// White noise of deviation 1 smoothed by a Gaussian of `length` px, with the deviation 1 again: errors go
-/// together as `exp(-d^2 / (4 l^2))`.
+/// White noise of standard deviation 1 smoothed by a Gaussian of `length` px, with the standard deviation 1
+/// again: errors go together as `exp(-d^2 / (4 l^2))`.
 fn smoothed(width: usize, height: usize, length: f64, rng: CounterRng) -> Vec<f64> {
     let reach = (3.0 * length).ceil() as i64;
     let weight: Vec<f64> = (-reach..=reach).map(|d| (-0.5 * (d as f64 / length).powi(2)).exp()).collect();

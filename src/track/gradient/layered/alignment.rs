@@ -9,7 +9,7 @@ use crate::math::robust_std;
 const MAX_STEPS: usize = 6;
 /// A level is left when a step is shorter, px.
 const MIN_STEP: f64 = 0.01;
-/// Least deviation of the residual, share of the range of the model.
+/// Least standard deviation of the residual, share of the range of the model.
 const MIN_STD_PER_RANGE: f64 = 0.03;
 /// What turning a target changes of its picture, over what growing does, squared, below which it is round:
 /// that much is noise. A square has a third.
@@ -29,7 +29,7 @@ pub(super) struct Alignment {
     pub gain: f64,
 }
 
-/// The residual's deviation, robustly.
+/// The residual's standard deviation, robustly.
 fn deviation(votes: &[Vote], noise: f64, range: f64) -> f64 {
     let mut sizes: Vec<f64> = votes.iter().map(|vote| vote.residual.abs()).collect();
     (robust_std(&mut sizes).unwrap_or(0.0)).max(noise).max(MIN_STD_PER_RANGE * range)

@@ -19,7 +19,7 @@ const LOOK_ALIKE_FRAMES: usize = 8;
 /// Minimum share of the possible information about the rotation for it to be reported; else the angle is
 /// held. Round targets are known by their outline: this bounds what errors of that may turn.
 const MIN_ROTATION_INFORMATION: f64 = 0.75;
-/// Least deviation of a measured position, px.
+/// Least standard deviation of a measured position, px.
 const MIN_POSITION_STD: f64 = 0.05;
 /// Frames after an interruption in which what is not seen of the target may be hidden still.
 const REAPPEARING_FRAMES: usize = 3;

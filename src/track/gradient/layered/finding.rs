@@ -7,7 +7,7 @@ use super::state::State;
 use super::task::{MotionModel, Task, VoteMask};
 use crate::types::Frame;
 
-/// Deviations of the increment from the prediction: of the position, px, and of size and angle.
+/// Standard deviations of the increment from the prediction: of the position, px, and of size and angle.
 pub(super) const PRIOR: [f64; 2] = [3.0, 0.02];
 /// Levels of a frame like the one before, and of one after an interruption; px.
 pub(super) const LEVELS: [f64; 4] = [4.0, 2.0, 1.0, 0.5];

@@ -17,7 +17,7 @@ const MAX_FRAMES: usize = 12;
 const MAX_DISPLACEMENT: isize = 20;
 /// Farthest displacement from where it is expected, px: in the first step, and later.
 const REACH: [isize; 2] = [10, 5];
-/// Change over the deviation of a difference that noise does not make.
+/// Change over the standard deviation of a difference that noise does not make.
 const CHANGE: f64 = 3.0;
 /// Difference that all larger ones count as, grey levels.
 const MAX_CHANGE: f64 = 40.0;

@@ -116,7 +116,7 @@ pub(super) fn distance_from_expected(state: &State, found: &Finding) -> f64 {
     (at[0] - expected[0]).hypot(at[1] - expected[1])
 }
 
-/// Deviation of the expected position, px.
+/// Standard deviation of the expected position, px.
 pub(super) fn position_std(state: &State) -> f64 {
     (0.5 * (state.motion.filter.p[0][(0, 0)] + state.motion.filter.p[1][(0, 0)])).sqrt().clamp(0.2, 3.0)
 }

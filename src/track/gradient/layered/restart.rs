@@ -15,7 +15,7 @@ use crate::types::{Frame, TargetBox};
 
 /// Variance of the displacement since the first frame, which is in whole pixels, px^2.
 const WHOLE_PIXEL_VARIANCE: f64 = 0.5;
-/// Deviation of the middle of what moved, whose sides are known to a pixel, px.
+/// Standard deviation of the middle of what moved, whose sides are known to a pixel, px.
 const CENTER_STD: f64 = 0.6;
 /// Change in still places that noise does not make, over the noise.
 const STILL_CHANGE_PER_NOISE: f64 = 4.0;

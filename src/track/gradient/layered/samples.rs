@@ -11,7 +11,7 @@ const MAX_STEPS: usize = 8;
 const MIN_STEP: f64 = 0.005;
 /// By how much the capped residual must fall.
 pub(super) const MAX_RESIDUAL_RATIO: f64 = 0.9;
-/// Every which of them the deviation of the residuals is measured on.
+/// Every which of them the standard deviation of the residuals is measured on.
 const EVERY: usize = 4;
 /// Residual that all larger ones count as, grey levels.
 pub(super) const MAX_RESIDUAL: f64 = 25.0;

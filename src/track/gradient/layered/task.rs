@@ -69,9 +69,9 @@ pub(super) struct Task<'a> {
     pub noise: f64,
     pub motion_model: MotionModel,
     pub vote_mask: VoteMask,
-    /// Deviations of the increment beforehand: of d, px, and of B.
+    /// Standard deviations of the increment beforehand: of d, px, and of B.
     pub prior: [f64; 2],
-    /// Deviations of the Gaussians, coarse to fine, px of the picture.
+    /// Standard deviations of the Gaussians, coarse to fine, px of the picture.
     pub levels: &'a [f64],
 }
 

@@ -303,7 +303,7 @@ impl LocalLoop {
         }
     }
 
-    /// Three deviations of the accepted flow outside the target.
+    /// Three standard deviations of the accepted flow outside the target.
     fn automatic_min_speed(&self, flow: &LocalFlow) -> f64 {
         let mut sizes: Vec<f64> = self.around(flow).flat_map(|w| w.map(f64::abs)).collect();
         (3.0 * MAD_TO_STD * median(&mut sizes)).max(MIN_SPEED)
