@@ -1,10 +1,10 @@
-//! What is not known must not be reported as `ok`: valleys, opposite motions, samples of many points.
+//! What is not known must not be reported as `ok`: lines of minima, opposite motions, samples of many points.
 
 use super::scenes::{Scene, W, mahalanobis, oblique, smooth};
 use jacoflow::motion3d::*;
 
-/// How many estimates are confident (`ok`), and how many of those are off by more than four deviations, with
-/// the truth outside of the ellipsoid that holds 0.999.
+/// How many estimates are confident (`ok`), and how many of those are off by more than four standard
+/// deviations, with the truth outside of the ellipsoid that holds 0.999.
 fn silently_wrong(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {
     let (mut confident, mut wrong) = (0u32, 0u32);
     for seed in 0..trials {
