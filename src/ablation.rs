@@ -1,8 +1,8 @@
 //! Switches heuristics off, one at a time, so that a table can show what each of them buys.
 //!
 //! A heuristic is a rule that the specification's equations do not contain: a repair of a start, an
-//! exception, a second search, a gate, a filler of gaps. Each has a line in [`HEURISTICS`] and one call of
-//! [`keeps`] where it acts. Without the feature `ablation` every call is the constant `true`; with it the
+//! exception, a second search, a threshold, a filler of gaps. Each has a line in [`HEURISTICS`] and one call
+//! of [`keeps`] where it acts. Without the feature `ablation` every call is the constant `true`; with it the
 //! environment variable `JACOFLOW_WITHOUT` lists the names that are off. `benchmarks/ablation` prints the
 //! table.
 

@@ -119,7 +119,7 @@ def told(truth: Truth, clustering: Clustering) -> dict[int, Cluster]:
 
 
 class Scores:
-    """Everything that is measured of one film; steps are counted from 0."""
+    """Everything that is measured of one sequence; steps are counted from 0."""
 
     def __init__(self, truths: Sequence[Truth], clusterings: Sequence[Clustering], graph: Graph) -> None:
         self.truths, self.clusterings, self.graph = truths, clusterings, graph

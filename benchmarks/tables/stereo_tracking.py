@@ -80,7 +80,7 @@ class Cost:
 def follow(
     scene: stereo_scenes.Scene, film: Sequence[stereo_scenes.Step], tracker: StereoTracker, from_truth: bool
 ) -> tuple[Scores, Cost]:
-    """Scores of a film, and the time of a step, the median."""
+    """Scores of a sequence, and the time of a step, the median."""
     clusterings, costs, rounds = [], [], []
     rng = np.random.default_rng(scene.seed)
     for shown in film:

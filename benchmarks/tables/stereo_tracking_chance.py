@@ -30,7 +30,7 @@ HISTORY = 3
 
 
 def scored(scene: Scene, seed: int) -> Scores:
-    """What the tracker makes of a film."""
+    """What the tracker makes of a sequence."""
     return follow(
         scene, scene.film(), StereoTracker(disparity_range=scene.disparity_range, random_state=seed), False
     )[0]

@@ -14,7 +14,7 @@ const MARGIN: usize = BEFORE + 2;
 /// centres (M. Unser, "Splines: a perfect fit for signal and image processing", 1999).
 ///
 /// `f(x, y) = sum_j sum_i c_ij b(x - i) b(y - j)` with the cubic B-spline `b`; the coefficients `c` are such
-/// that `f` meets every sample. Finite samples are asked for: anything else spreads along its column and row.
+/// that `f` meets every sample. Samples must be finite: any other spreads along its column and row.
 #[derive(Debug, Clone)]
 pub(crate) struct Spline<T> {
     width: usize,

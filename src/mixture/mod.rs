@@ -7,6 +7,9 @@
 //! adds the weights). A point's weight is evidence: a weight of 3 is the point three times. Surplus
 //! components lose their points and go back to the prior.
 //!
+//! `fit` repeats rounds from `seeding` or `start`: `expectation` (with `densities`) leaves `moments` of the
+//! points, from which `posterior` follows under the `prior`; `bound` ends them. `online` takes batches.
+//!
 //! ```
 //! use jacoflow::mixture::{CovariancePrior, MixtureOptions, Points, Start, fit};
 //! # fn main() -> jacoflow::Result<()> {

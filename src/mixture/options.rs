@@ -1,4 +1,4 @@
-//! What a fit may be asked for.
+//! Options of a fit.
 
 use crate::error::{Error, Result};
 use crate::parallel::Threads;

@@ -127,7 +127,7 @@ fn raise_where_none(matrix: &mut [f64], spread: &[bool]) {
 }
 
 /// Adds to the diagonal of a covariance that has no, or nearly no, extent in some direction. Correlations
-/// tell, so that the axes' units make no difference.
+/// decide, so that the axes' units make no difference.
 fn raise_if_flat(matrix: &mut [f64], d: usize) {
     let deviations: Vec<f64> = (0..d).map(|i| matrix[i * (d + 1)].sqrt()).collect();
     let correlations: Vec<f64> = (0..d * d).map(|at| matrix[at] / deviations[at / d] / deviations[at % d]).collect();

@@ -66,7 +66,7 @@ impl Level {
         [Some(Self::SCALAR), Self::avx2(), Self::avx512()].into_iter().flatten().collect()
     }
 
-    /// The level used unless told otherwise: that of [`Level::from_environment`], else the best. Read once.
+    /// The default level: that of [`Level::from_environment`], else the best. Read once.
     pub fn detect() -> Self {
         static LEVEL: OnceLock<Level> = OnceLock::new();
         *LEVEL.get_or_init(|| {

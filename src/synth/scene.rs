@@ -1,4 +1,4 @@
-//! What every scene can tell.
+//! What every scene has: brightness, flow and Jacobian at any point and time.
 
 use crate::parallel::for_each_band;
 use crate::types::{AffineFlow, Frame};

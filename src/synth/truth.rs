@@ -16,7 +16,7 @@ pub fn truth(scene: &dyn Scene, t: f64) -> Result<FlowField<f64>> {
     field(scene, t, |x, y| scene.motion(x, y, t).map(AffineFlow::to_array))
 }
 
-/// What two frames can tell of the motion: the mean velocity, between the times `t + from` and `t + to`, of
+/// The motion that two frames determine: the mean velocity, between the times `t + from` and `t + to`, of
 /// the matter that is at each pixel at time `t`.
 ///
 /// With `d(t1)` the displacement since time `t` the flow is `(d(t + to) - d(t + from)) / (to - from)`,

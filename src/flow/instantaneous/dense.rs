@@ -31,7 +31,7 @@ pub(super) struct RowKernel<'a, T> {
 pub(super) enum Target<'a, T> {
     /// The estimate: a slice a parameter, and one for the trust, each as long as the row's columns.
     Motion([&'a mut [T]; 6], &'a mut [T]),
-    /// The equations' coefficients, for a kernel that tells more of them.
+    /// The equations' coefficients, for the kernel of covariance and diagnostics.
     Rates(RatesRow<&'a mut [T]>),
 }
 

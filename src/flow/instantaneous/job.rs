@@ -28,7 +28,7 @@ pub(super) struct RowPlan<T> {
     pub source: Source<T>,
 }
 
-/// The mask in the two forms that a neighbourhood asks it in.
+/// The mask in the two forms in which a neighbourhood needs it.
 pub(super) struct SiteMask<'a> {
     mask: &'a Mask,
     counts: MaskCounts,

@@ -5,7 +5,8 @@
 //! tracker", 2000: in a square window around each point, whose brightness moves by one translation.
 //!
 //! Build one [`PointPyramid`] a frame and keep it: the frame after of one pair is the frame before of the
-//! next.
+//! next. `batch` follows many points forward and back, `follow` one through the levels, `window` has the sums
+//! over one window, on `rows` continued beyond the border.
 
 mod batch;
 mod follow;

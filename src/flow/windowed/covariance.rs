@@ -23,7 +23,7 @@
 //! ([`super::high_frequencies`]), where motion and misfit are weak. The residual gives another, its sum of
 //! squares over its expectation `c0 sum w - tr(N^-1 S)`, which misfit can only raise: so the variance is
 //! never more than what chance allows beyond that, and where the residual is that much larger than noise and
-//! truncation explain, at motion boundaries or changes of lighting, it widens the covariance.
+//! truncation explain, at motion boundaries or changes of lighting, it inflates the covariance.
 
 use super::bias_planes::{self, Ring};
 use super::covariance_kernels::{Outer, Pass, Scatter, Weigh};

@@ -17,7 +17,7 @@ pub(super) const GROUP_ROWS: usize = 8;
 
 /// The images and how to take their jets.
 pub(super) struct Source<'a, T> {
-    /// Frames, oldest first, smoothed already where that was asked for.
+    /// Frames, oldest first, smoothed already where that was requested.
     pub frames: Vec<&'a Frame<T>>,
     /// How they are combined.
     pub combination: Combination,

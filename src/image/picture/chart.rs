@@ -7,7 +7,7 @@ use super::{Picture, Rgb};
 
 /// Distance of steps where there is room, and of lanes, px.
 const PITCH: [f64; 2] = [36.0, 28.0];
-/// Widest picture, px: of very long films the steps are drawn closer together.
+/// Widest picture, px: of very long sequences the steps are drawn closer together.
 const WIDEST: f64 = 16_000.0;
 /// Room about the outermost nodes, px.
 const MARGIN: f64 = 40.0;

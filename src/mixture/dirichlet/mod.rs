@@ -5,6 +5,9 @@
 //! Blei and M. Jordan, "Variational inference for Dirichlet process mixtures" (2006).
 //! `docs/dirichlet_mixture.md` has all equations.
 //!
+//! `fit` is the entry point; `em` repeats rounds (`components` and `sticks` are its M step), `merge` pools
+//! components while that raises the `score`.
+//!
 //! ```
 //! use jacoflow::math::random::CounterRng;
 //! use jacoflow::mixture::{DirichletOptions, Points, fit_dirichlet};

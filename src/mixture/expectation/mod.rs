@@ -88,8 +88,8 @@ fn moments(sums: &[f64], densities: &Densities) -> Moments {
     moments
 }
 
-/// Turns `ln rho` (K, BLOCK) into `rho` over the greatest one's, tells what makes weighted responsibilities
-/// of them (`scale`), and returns `sum_n f_n sum_k r_nk ln r_nk`.
+/// Turns `ln rho` (K, BLOCK) into `rho` over the greatest one's, sets the factor that makes weighted
+/// responsibilities of them (`scale`), and returns `sum_n f_n sum_k r_nk ln r_nk`.
 #[inline(always)]
 fn shares<V: Lanes<Scalar = f64>>(
     logs: &mut [f64],

@@ -27,7 +27,7 @@ pub enum Method {
 /// A rotation rate known from elsewhere: a gyroscope, or the rest of the scene where the points lie on a
 /// object that moves by itself.
 ///
-/// In a narrow field a rotation looks like a sideways translation; what is known of it decides between both.
+/// In a narrow field a rotation looks like a lateral translation; what is known of it decides between both.
 /// Where flow contradicts it beyond chance the status is [`Ambiguous`](crate::motion3d::Status::Ambiguous);
 /// of a rotation alone the covariance and the alternative show it.
 #[derive(Debug, Clone, Copy, PartialEq)]

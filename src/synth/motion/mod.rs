@@ -29,7 +29,7 @@ pub trait Motion: Send + Sync {
     /// The map that takes matter from its place at time `from` to its place at time `to`.
     fn path_map(&self, from: f64, to: f64) -> PointMap<'_>;
 
-    /// Velocity and its Jacobian where they are finite, as a scene tells its truth.
+    /// Velocity and its Jacobian where they are finite, as the truth of a scene.
     fn truth(&self, x: f64, y: f64, t: f64) -> Option<AffineFlow<f64>> {
         let motion = self.velocity(x, y, t);
         motion.to_array().iter().all(|value| value.is_finite()).then_some(motion)

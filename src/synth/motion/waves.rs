@@ -23,7 +23,7 @@ struct Wave {
 }
 
 /// A steady smooth velocity field of one scale with divergence and curl: eight waves of equal strength and
-/// random phase, their wavelengths within a factor `2^(1/4)` of the one asked for, their directions and
+/// random phase, their wavelengths within a factor `2^(1/4)` of the requested one, their directions and
 /// polarisations spread evenly.
 ///
 /// Velocity and Jacobian are exact; paths have no closed form and are integrated (Runge-Kutta, fourth order;

@@ -1,7 +1,9 @@
 //! The filter's arithmetic, for lanes of pixels; the same source with one lane is the scalar reference.
 //!
 //! Per chunk of blocks three passes run one after the other: measurement, prediction, update. Each is a
-//! kernel of its own, so that the number of compiled variants is a sum, not a product.
+//! kernel of its own, so that the number of compiled variants is a sum, not a product. `predict` moves
+//! sigma points by `transition` with process `noise` and sums their `moments`; `update` takes the measured
+//! jet; `factor` and `vector` serve both.
 
 pub(super) mod factor;
 mod moments;

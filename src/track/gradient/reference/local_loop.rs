@@ -2,7 +2,7 @@
 //! filter that steers the window.
 //!
 //! M. Chiba and S. Ozawa, section on the tracking algorithm, equations (11) to (26), with the repairs that it
-//! needs: a gate for weak gradients, two starts of the flow, steering by position, a gate for innovations,
+//! needs: a minimum of the gradients, two starts of the flow, steering by position, a maximum of innovations,
 //! and a rule for targets that stop. [`Rules::paper`] is the text to the letter.
 
 use super::extent::{Ends, Extent, ends};

@@ -109,7 +109,7 @@ impl ReferenceOptions {
 #[derive(Debug, Clone)]
 pub(super) struct Rules {
     pub flow: LocalFlowOptions,
-    /// Gradient up to which a window is flat, grey levels/px. Without a gate for weak gradients it is what
+    /// Gradient up to which a window is flat, grey levels/px. Without a minimum of the gradients it is what
     /// rounding to whole grey levels makes: what interpolation leaves beside an edge would pass for texture.
     pub flat: f64,
     pub dynamics: Dynamics,
