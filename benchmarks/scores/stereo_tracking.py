@@ -284,7 +284,7 @@ class Scores:
 
         `affine`: median of the affine motion over the label's pixels beside the median of the truth there.
         `velocity`: velocity beside the truth of the label at the cluster's `middle`, where that is known.
-        `median`: velocity beside the median of the truth (section 5.2); one row of pixels too many makes .06
+        `median`: velocity beside the median of the truth; one row of pixels too many makes .06
         px where the motion varies.
         """
         errors = defaultdict(list)

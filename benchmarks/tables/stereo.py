@@ -3,9 +3,8 @@
     python -m benchmarks.tables.stereo [--quick]
 
 Synthetic scenes with exact truth, some steps of each. All methods are judged at the same edge pixels of the
-left view (section 2.2 of the specification), each at its own resolution. OpenCV matches whole rows: on these
-scenes, whose cameras are not aligned, it is shown as it is and with the right view moved by the true row
-offset.
+left view, each at its own resolution. OpenCV matches whole rows: on these scenes, whose cameras are not
+aligned, it is shown as it is and with the right view moved by the true row offset.
 """
 
 from __future__ import annotations

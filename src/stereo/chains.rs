@@ -1,4 +1,4 @@
-//! Costs summed along chains of edge pixels: the sparse semi-global matching of section 6.2.
+//! Costs summed along chains of edge pixels: sparse semi-global matching.
 //!
 //! For each of 8 directions r let q be the nearest edge pixel behind p along r, at most 16 px away, g its
 //! distance: `L_r(p, d) = C(p, d) + min{L_r(q, d), L_r(q, d +- 1) + P1 e^{-g/16}, min L_r(q, .) + P2

@@ -1,4 +1,4 @@
-//! Disparity by agreement of gradient classes in a window: section 2.3.
+//! Disparity by agreement of gradient classes in a window, the paper's matching.
 //!
 //! Few of the candidates of an edge pixel show its own class at their middle, about one in twenty. Only these
 //! have their window compared, 32 pixels of a row at a time.

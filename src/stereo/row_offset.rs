@@ -39,7 +39,7 @@ const MIN_SLOPE_SQUARES: f64 = 4.0;
 
 /// How many rows lower the right view shows a point, `y_right - y_left`; 0 without matches.
 ///
-/// The most frequent row offset of the class matching (section 2.3) of some edge pixels within `row_range`;
+/// The most frequent row offset of the class matching of some edge pixels within `row_range`;
 /// disparity by semi-global matching of the rows so aligned; Lucas-Kanade steps along y in 9 x 9 windows
 /// round edge pixels, weighted by `1 / (1 + (r / 2 s)^2)^2`, r a window's residual and s the median of all.
 /// `row_offset`, `prior` and the method of the options are not looked at. Identical for any number of

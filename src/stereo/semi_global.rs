@@ -1,4 +1,4 @@
-//! Sparse semi-global matching of two views whose rows are aligned, checked from both sides: section 6.2.
+//! Sparse semi-global matching of two views whose rows are aligned, checked from both sides.
 
 use super::chains::{From, sweep};
 use super::cost::{Candidates, Coded, MAX_COST, Side, costs};

@@ -1,4 +1,4 @@
-//! Fractions of a pixel by Lucas-Kanade steps along x: section 6.3.
+//! Fractions of a pixel by Lucas-Kanade steps along x.
 //!
 //! With the left slope `g` less its mean over the window, and the right window summed with it, `A(t) = sum g
 //! R(x' + t)`, a step is `(A(t) - sum g L) / sum g^2`; a difference in brightness drops out because the

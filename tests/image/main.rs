@@ -1,4 +1,4 @@
-//! Borders, smoothing, gradients, pyramids, corners, splines and pictures.
+//! Borders, smoothing, corners, jets, grey levels, sampling, preprocessing and pictures.
 
 mod border;
 mod corners;

@@ -1,4 +1,4 @@
-"""The stereo tracker on drawn scenes with exact truth: the specification's figures, identities, exposure."""
+"""The stereo tracker on synthetic scenes with exact truth: the specification's figures, identities, exposure."""
 
 from dataclasses import replace
 from functools import cache, lru_cache

@@ -1,4 +1,4 @@
-//! Edge pixels, and the class of every pixel's gradient direction: sections 2.1 and 2.2.
+//! Edge pixels, and the class of every pixel's gradient direction: (2), (3) and (5) of the paper.
 
 use jacoflow::stereo::{EdgeMap, EdgeSettings};
 use jacoflow::types::Frame;

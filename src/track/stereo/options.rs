@@ -22,7 +22,7 @@ const MAX_CARRIED_ITERATIONS: usize = 30;
 const BOUND_TOLERANCE: f64 = 1e-4;
 /// Components with fewer pixels are seeded again; smallest object that is recognised, pixels.
 pub(super) const MIN_COMPONENT_PIXELS: f64 = 20.0;
-/// Smallest score of an arc that continues a track, 0 to 2 (section 2.8 of the paper's system).
+/// Smallest score of an arc that continues a track, 0 to 2.
 pub const ARC_THRESHOLD: f64 = 0.4;
 
 /// Which system.

@@ -1,4 +1,4 @@
-//! Edge pixels with a disparity, counted in a grid of voxels: section 2.4 of the stereo paper's system.
+//! Edge pixels with a disparity, counted in a grid of voxels.
 
 use super::options::VoxelGrid;
 use crate::types::Frame;

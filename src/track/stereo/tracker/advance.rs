@@ -24,7 +24,7 @@ use crate::types::Frame;
 use rayon::prelude::*;
 
 impl StereoTracker {
-    /// The paper's step: a new mixture, matching and overlaps forwards and backwards (sections 2.5 to 2.8).
+    /// The paper's step: a new mixture, matching and overlaps forwards and backwards, (29) to (33).
     pub(super) fn advance_as_printed(
         &mut self,
         points: EdgePoints,
