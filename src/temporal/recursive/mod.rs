@@ -37,6 +37,8 @@
 //! # Pixels without an estimate
 //! Where a time gives none (NaN, mask, no structure) only that time is lost: the state stays, its information
 //! is forgotten, and the result is the prediction with status `Predicted`.
+//!
+//! `fusion` takes whole fields, `kernel` has one step for lanes of sites.
 
 mod fusion;
 mod kernel;

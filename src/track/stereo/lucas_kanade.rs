@@ -1,5 +1,5 @@
 //! Affine motion of a cluster on its edge pixels (B. Lucas and T. Kanade, 1981), coarse to fine, robustly
-//! weighted.
+//! weighted; `task` has the iterations of one cluster.
 
 mod task;
 

@@ -1,4 +1,7 @@
 //! The stereo tracker, step by step.
+//!
+//! `advance` has a step of either mode. It calls `expected` (motions of the last clusters), `cluster` (the
+//! mixture), `meeting` (overlaps, arcs, renumbering) and `record` (tracks, graph, result).
 
 mod advance;
 mod cluster;

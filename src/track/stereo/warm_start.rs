@@ -1,4 +1,5 @@
-//! Components carried to the next step, and new seeds for those without pixels.
+//! Components carried to the next step, and new seeds for those without pixels, from connected voxels
+//! (`blobs`). After a cold start `split_merge` makes one component of each object.
 
 mod blobs;
 mod split_merge;

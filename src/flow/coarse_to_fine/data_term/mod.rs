@@ -16,6 +16,9 @@
 //! Kanade, "An iterative image registration technique with an application to stereo vision", 1981. The right
 //! side holds the whole motion and not only its increment, so that iterations do not undo the smoothing by
 //! the window.
+//!
+//! `band` runs rows of sites through `dense` (motion at every pixel), `warp` (views along it), `products`
+//! (a pixel's equations) and `moments` (their windowed sums); `scratch` holds the rows.
 
 mod band;
 mod dense;

@@ -1,4 +1,7 @@
 //! Descent through the pyramid: iterations on each level, from the coarsest to the finest.
+//!
+//! `iteration` is one linearisation with its regularised solution, and the unregularised trial; `comparison`
+//! takes the better of two motions at each site; `intermediate` refines a level before the next one.
 
 pub(super) mod comparison;
 mod intermediate;

@@ -1,4 +1,5 @@
-//! Field at the requested sites: motion, covariance, status and diagnostics.
+//! Field at the requested sites: motion, covariance, status (`consistency`) and
+//! diagnostics.
 
 mod consistency;
 

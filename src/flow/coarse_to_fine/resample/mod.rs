@@ -1,4 +1,5 @@
-//! Motion between the sites, on the next finer or coarser level, and at other pixels.
+//! Motion between the sites, on the next finer or coarser level, and at other pixels
+//! (`rows`); that of a pair at the pixels of its `first_frame`.
 
 pub(super) mod first_frame;
 pub(super) mod rows;
