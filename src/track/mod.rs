@@ -5,6 +5,8 @@
 //! * [`ParticleTracker`]: several targets that may look alike; takes all their boxes, since they need each
 //!   other's predictions.
 //! * [`StereoTracker`]: all moving objects before a pair of cameras; takes pairs of views, no boxes.
+//!
+//! `tracker` has the trait; `grey_levels` brings frames to the scale of the thresholds.
 
 pub mod gradient;
 mod grey_levels;
