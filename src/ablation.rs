@@ -24,6 +24,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("edges.contrast", "gain between the cameras is estimated and taken out"),
     ("edges.refused_cost", "matches of a high cost are refused"),
     ("edges.watched_rows", "a known row offset is estimated again where a pair contradicts it"),
+    ("edges.second_pass", "the row offset is estimated twice"),
     ("edges.believed_rows", "a row offset is kept only if the views agree with it"),
     ("stereo.exposure_levels", "a large change of exposure is read off the deciles of brightness"),
     ("stereo.exposure_motion", "exposure from pixels whose motion is known, then motion again"),

@@ -16,11 +16,13 @@ use crate::math::median;
 use crate::types::Frame;
 use rayon::prelude::*;
 
-/// Vertical steps.
+/// Passes of disparity and vertical steps.
+const PASSES: usize = 2;
+/// Vertical steps of a pass.
 const STEPS: usize = 6;
 /// Convergence tolerance of a step, rows.
 const MIN_STEP: f64 = 1e-3;
-/// Largest change from the start, rows.
+/// Largest change from the start of a pass, rows.
 const MAX_SHIFT: f64 = 1.5;
 /// Step of the edge pixels in the class matching.
 const SAMPLED: usize = 4;
@@ -39,8 +41,8 @@ const MIN_SLOPE_SQUARES: f64 = 4.0;
 
 /// How many rows lower the right view shows a point, `y_right - y_left`; 0 without matches.
 ///
-/// The most frequent row offset of the class matching of some edge pixels within `row_range`;
-/// disparity by semi-global matching of the rows so aligned; Lucas-Kanade steps along y in 9 x 9 windows
+/// The most frequent row offset of the class matching of some edge pixels within `row_range`, then twice:
+/// disparity by semi-global matching of the rows so aligned, and Lucas-Kanade steps along y in 9 x 9 windows
 /// round edge pixels, weighted by `1 / (1 + (r / 2 s)^2)^2`, r a window's residual and s the median of all.
 /// `row_offset`, `prior` and the method of the options are not looked at. Identical for any number of
 /// threads.
@@ -97,13 +99,19 @@ pub(super) fn row_offset_of(
     let options = EdgeDisparityOptions { prior: None, subpixel: true, left_right_check: true, ..options.clone() };
     let classes = EdgeMap::new(right, &EdgeSettings::of(&options));
     let matches = match_classes(&view.edges, &classes, &options, options.row_range, SAMPLED);
-    let offset = f64::from(most_frequent_row(&matches, options.row_range));
+    let mut offset = f64::from(most_frequent_row(&matches, options.row_range));
     let (left_smooth, right_smooth) = smoothed(left, right);
-    let matches = match_aligned(left, view, right, offset, &options);
-    let agreement = Agreement::of(&matches);
-    let mut windows = windows(&left_smooth, view, &matches, WINDOWS.1);
-    let refined = vertical_steps(&mut windows, &right_smooth, offset, STEPS);
-    RowEstimate { rows: refined.unwrap_or(offset), settled: refined.is_some(), agreement }
+    let mut agreement = Agreement::new(std::iter::empty());
+    for _ in 0..if crate::ablation::keeps("edges.second_pass") { PASSES } else { 1 } {
+        let matches = match_aligned(left, view, right, offset, &options);
+        agreement = Agreement::of(&matches);
+        let mut windows = windows(&left_smooth, view, &matches, WINDOWS.1);
+        match vertical_steps(&mut windows, &right_smooth, offset, STEPS) {
+            Some(refined) => offset = refined,
+            None => return RowEstimate { rows: offset, settled: false, agreement },
+        }
+    }
+    RowEstimate { rows: offset, settled: true, agreement }
 }
 
 /// One vertical step from the offset of the matches, rows; none for too few windows.
