@@ -148,8 +148,8 @@ impl SynthCommand {
         let bar = Bar::new(watch, "synth", self.messages.quiet);
         let written = self.write(&*scene, output, &formats, threads, &bar);
         drop(bar);
-        let told = matches!(written.1, Ok(()) | Err(Error::Interrupted)) || written.0 > 0;
-        if told && !self.messages.quiet {
+        let is_reported = matches!(written.1, Ok(()) | Err(Error::Interrupted)) || written.0 > 0;
+        if is_reported && !self.messages.quiet {
             print_message(&format!("{} of {} frames written to {}", written.0, self.count(), output.display()));
         }
         let summary = json!({

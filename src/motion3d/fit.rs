@@ -169,9 +169,9 @@ impl Task<'_, '_> {
         let low = plugged.is_none();
         let several = near_best(candidates, inliers.n).len() > 1;
         let Minimum { motion, tangent, .. } = &chosen.minimum;
-        let valley = ProfileLikelihood { observations: inliers, motion, tangent };
+        let profile = ProfileLikelihood { observations: inliers, motion, tangent };
         let beyond = |plugged: &PluginCovariances| {
-            beyond_theory(inliers, &chosen.minimum, plugged) || valley.bent(&plugged.likelihood) > 0
+            beyond_theory(inliers, &chosen.minimum, plugged) || profile.bent(&plugged.likelihood) > 0
         };
         let nonlinear = plugged.as_ref().is_some_and(beyond);
         let trial = if wanted || low || several || nonlinear {
@@ -185,7 +185,7 @@ impl Task<'_, '_> {
         }
         let mut improved = improved.filter(|_| wanted || low || nonlinear);
         // Maximum likelihood alone is undetermined beyond its theory.
-        let mut described = plugged.as_ref().is_none_or(|plugged| valley.bent(&plugged.likelihood) == 0);
+        let mut described = plugged.as_ref().is_none_or(|plugged| profile.bent(&plugged.likelihood) == 0);
         if let Some(best) = &mut improved {
             (best.covariance, described) = best.lengthened(inliers, || self.smoother(inliers));
         }

@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn ranges_are_two_whole_numbers_in_order() {
         assert_eq!(parse_range("-40, 24"), Ok((-40, 24)));
-        assert!(parse_range("3,2").is_err_and(|told| told.contains("2,3")));
+        assert!(parse_range("3,2").is_err_and(|message| message.contains("2,3")));
         assert!(parse_range("3").is_err() && parse_range("1.5,2").is_err());
     }
 

@@ -70,20 +70,21 @@ pub(crate) fn plausible_beyond(
 ) -> bool {
     let searched = &*at_most(observations, most, rng);
     let first = motions[0].u();
-    let known: Vec<TestedDirection> = motions.iter().filter_map(|motion| ask(searched, &motion.u(), &first)).collect();
+    let known: Vec<TestedDirection> =
+        motions.iter().filter_map(|motion| test_direction(searched, &motion.u(), &first)).collect();
     let Some(best) = known.iter().min_by(|a, b| a.cost.total_cmp(&b.cost)) else { return false };
     let limit = best.cost + PLAUSIBLE;
     let widest = limit + CHANCE * 2.0 * (searched.n as f64).sqrt();
     let mut doubts = evaluate(|u| {
         // Signs are looked at only where the residuals alone would do.
         best_rotation(searched, u).filter(|(_, cost)| *cost < widest)?;
-        let asked = ask(searched, u, &first)?;
-        let chance = || CHANCE * fluctuation(searched, &best.motion, &asked.motion);
-        let doubtful = (asked.angle > farther.residuals && asked.cost < limit)
-            || (asked.angle > farther.chance && asked.cost < limit + chance());
-        doubtful.then_some(asked)
+        let tested = test_direction(searched, u, &first)?;
+        let chance = || CHANCE * fluctuation(searched, &best.motion, &tested.motion);
+        let doubtful = (tested.angle > farther.residuals && tested.cost < limit)
+            || (tested.angle > farther.chance && tested.cost < limit + chance());
+        doubtful.then_some(tested)
     });
-    if doubts.iter().any(|asked| asked.angle > farther.residuals && asked.cost < limit) {
+    if doubts.iter().any(|tested| tested.angle > farther.residuals && tested.cost < limit) {
         return true;
     }
     if !keeps("motion3d.region_by_chance") {
@@ -91,11 +92,15 @@ pub(crate) fn plausible_beyond(
     }
     doubts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     doubts.truncate(COMPARED);
-    let among = |asked: &[TestedDirection]| asked.iter().map(|asked| (searched, *asked)).collect::<Vec<_>>();
+    let among = |tested: &[TestedDirection]| tested.iter().map(|tested| (searched, *tested)).collect::<Vec<_>>();
     as_likely(&among(&known), &among(&doubts), rng.stream(1))
 }
 
-pub(crate) fn ask(observations: &Observations, u: &Vector3<f64>, first: &Vector3<f64>) -> Option<TestedDirection> {
+pub(crate) fn test_direction(
+    observations: &Observations,
+    u: &Vector3<f64>,
+    first: &Vector3<f64>,
+) -> Option<TestedDirection> {
     let (w, cost) = best_rotation(observations, u)?;
     let signs = [Motion::of(u, &w), Motion::of(&-u, &w)];
     let behind = signs.map(|motion| equations(observations, &motion, &tangents(&motion.u()), None).behind);
@@ -125,11 +130,12 @@ pub(crate) fn as_likely(
 ) -> bool {
     let Some((points, _)) = known.first().filter(|_| !doubts.is_empty()) else { return false };
     let mut smoother = DepthSmoother::new(points, Smoother::Auto, rng);
-    let cost =
-        |(points, asked): &(&Observations, TestedDirection)| asked.cost + smoother.cost(&depths(points, &asked.motion));
+    let cost = |(points, tested): &(&Observations, TestedDirection)| {
+        tested.cost + smoother.cost(&depths(points, &tested.motion))
+    };
     let limit = known.iter().map(cost).fold(f64::INFINITY, f64::min) + AS_SMOOTH * (points.n as f64).sqrt();
     let smooth: Vec<_> = doubts.iter().filter(|doubt| cost(doubt) < limit).collect();
-    smooth.into_iter().any(|(points, asked)| consistent(points, &asked.motion, &mut smoother))
+    smooth.into_iter().any(|(points, tested)| consistent(points, &tested.motion, &mut smoother))
 }
 
 /// Whether the estimating equation holds at a motion but for chance: of `g = sum W^t e` with weights from
@@ -166,19 +172,20 @@ pub(crate) fn plausible_less_turned(
         return false;
     }
     let u = motion.u();
-    let Some(best) = ask(own, &u, &u) else { return false };
-    let limit = |asked: &TestedDirection| best.cost + PLAUSIBLE + CHANCE * fluctuation(own, motion, &asked.motion);
-    let apart = |asked: &TestedDirection| asked.motion.angle_to(motion).to_degrees() > farther.chance;
-    let mut asked = evaluate(|u| ask(&fresh, u, u));
-    asked.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    asked.retain(|asked| apart(asked) && asked.cost < limit(asked));
-    asked.truncate(COMPARED);
+    let Some(best) = test_direction(own, &u, &u) else { return false };
+    let limit = |tested: &TestedDirection| best.cost + PLAUSIBLE + CHANCE * fluctuation(own, motion, &tested.motion);
+    let apart = |tested: &TestedDirection| tested.motion.angle_to(motion).to_degrees() > farther.chance;
+    let mut tested = evaluate(|u| test_direction(&fresh, u, u));
+    tested.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    tested.retain(|tested| apart(tested) && tested.cost < limit(tested));
+    tested.truncate(COMPARED);
     let found = minima(&fresh, rng.stream(1));
-    asked.extend(found.iter().filter_map(|minimum| ask(&fresh, &minimum.motion.u(), &u)));
-    let exact = asked.into_par_iter().filter_map(|asked| exactly(whitening, &fresh, asked));
+    tested.extend(found.iter().filter_map(|minimum| test_direction(&fresh, &minimum.motion.u(), &u)));
+    let exact = tested.into_par_iter().filter_map(|tested| exactly(whitening, &fresh, tested));
     let exact: Vec<(Observations, TestedDirection)> =
-        exact.filter(|(_, asked)| apart(asked) && asked.cost < limit(asked)).collect();
-    let doubts: Vec<(&Observations, TestedDirection)> = exact.iter().map(|(points, asked)| (points, *asked)).collect();
+        exact.filter(|(_, tested)| apart(tested) && tested.cost < limit(tested)).collect();
+    let doubts: Vec<(&Observations, TestedDirection)> =
+        exact.iter().map(|(points, tested)| (points, *tested)).collect();
     as_likely(&[(own, best)], &doubts, rng.stream(2))
 }
 
@@ -186,14 +193,14 @@ pub(crate) fn plausible_less_turned(
 pub(crate) fn exactly(
     whitening: &Whitening<'_>,
     fresh: &Observations,
-    mut asked: TestedDirection,
+    mut tested: TestedDirection,
 ) -> Option<(Observations, TestedDirection)> {
-    let u = asked.motion.u();
+    let u = tested.motion.u();
     let mut turned = None;
     for _ in 0..ROUNDS {
-        let next = whitening.derotated(fresh, asked.motion.derotation());
-        asked = ask(&next, &u, &u)?;
+        let next = whitening.derotated(fresh, tested.motion.derotation());
+        tested = test_direction(&next, &u, &u)?;
         turned = Some(next);
     }
-    turned.filter(|turned| turned.unseen() <= fresh.unseen()).map(|turned| (turned, asked))
+    turned.filter(|turned| turned.unseen() <= fresh.unseen()).map(|turned| (turned, tested))
 }

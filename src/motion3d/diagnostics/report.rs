@@ -101,16 +101,16 @@ fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations,
     let rates = Rates::new(&out.uncertain());
     let likeliest = likeliest(out, inliers, solution);
     let u_z = solution.motion.u().z;
-    let told = |k: usize| {
+    let rated = |k: usize| {
         let (nu, variance) = likeliest[all.source[k] as usize];
         let row = all.row(k);
         let slopes = rates.slopes(&row, nu);
         (rates.contact(nu, variance, &slopes), slopes)
     };
-    let told: Vec<((f64, f64), Slopes)> = (0..all.n).into_par_iter().with_min_len(TOGETHER).map(told).collect();
+    let rated: Vec<((f64, f64), Slopes)> = (0..all.n).into_par_iter().with_min_len(TOGETHER).map(rated).collect();
     // Summed in one order, whoever computed them.
     let (mut weights, mut sum, mut slopes) = (0.0, 0.0, Slopes::default());
-    for (k, (contact, own)) in told.iter().enumerate() {
+    for (k, (contact, own)) in rated.iter().enumerate() {
         let source = all.source[k] as usize;
         (out.time_to_contact[source], out.time_to_contact_std[source]) = *contact;
         if out.inliers[source] && seen.s2[k] > 0.0 {

@@ -39,7 +39,7 @@ pub(crate) fn contradiction(
     known: &KnownRotation,
     w: &Vector3<f64>,
     information: &Matrix5,
-    told: &CovarianceParts,
+    parts: &CovarianceParts,
 ) -> Option<Vector5> {
     let mut of_flow = *information;
     add_to_rotation(&mut of_flow, &known.information, -1.0);
@@ -49,9 +49,9 @@ pub(crate) fn contradiction(
     let apart = (before + alone.fixed_view::<3, 3>(2, 2)) * force;
     // What errors do to the motion they do to that of the flow alone, which nothing holds back, the more.
     let freed = alone * information;
-    let own = freed * told.own * freed.transpose() + alone - freed * alone;
+    let own = freed * parts.own * freed.transpose() + alone - freed * alone;
     // Of both only the flow's noise may be larger than given.
-    let spread = own * told.wider + freed * told.common * freed.transpose();
+    let spread = own * parts.wider + freed * parts.common * freed.transpose();
     let expected = before + spread.fixed_view::<3, 3>(2, 2);
     let expected = 0.5 * (expected + expected.transpose());
     let square = apart.dot(&expected.cholesky()?.solve(&apart));
@@ -84,8 +84,8 @@ pub(crate) fn rotation_contradiction(
         matrix
     };
     let information = whole(&plain.cholesky()?.inverse(), 1.0);
-    let told = CovarianceParts { own: whole(own, 1.0), wider: 1.0, common: whole(common, 0.0) };
-    let apart = contradiction(known, w, &information, &told)?.fixed_rows::<3>(2).into_owned();
+    let parts = CovarianceParts { own: whole(own, 1.0), wider: 1.0, common: whole(common, 0.0) };
+    let apart = contradiction(known, w, &information, &parts)?.fixed_rows::<3>(2).into_owned();
     let (alone, (force, before)) = (w - apart, known.pull(w));
     let excess = known.pull(&alone).1 - before - force.dot(&apart);
     let motion = Motion { translation: [f64::NAN; 3], rotation: alone.into() };

@@ -86,9 +86,9 @@ impl Solution {
         let Some(covariance) = self.covariance else { return };
         let from = EstimatedMotion { motion: self.motion, tangent: self.tangent, covariance };
         let smooth = self.smooth.as_deref().filter(|_| !given);
-        let Some(told) = weighted_by_posterior(all, known, &from, smooth, !given) else { return };
-        (self.motion, self.tangent) = (told.motion, told.tangent);
-        self.covariance = Some(told.covariance);
+        let Some(refit) = weighted_by_posterior(all, known, &from, smooth, !given) else { return };
+        (self.motion, self.tangent) = (refit.motion, refit.tangent);
+        self.covariance = Some(refit.covariance);
     }
 
     /// Takes errors into the covariance that go together over a length, in the unit of the points.
@@ -119,13 +119,13 @@ impl Solution {
     /// far as the motion of the flow alone.
     pub fn contradicted(&mut self, inliers: &Observations) -> bool {
         let (Some(known), Some(grown)) = (inliers.prior.as_ref(), &self.grown) else { return false };
-        let told = if let Some(nu) = &self.smooth {
+        let precision = if let Some(nu) = &self.smooth {
             information(inliers, &self.motion, &self.tangent, nu, 0.0)
         } else {
             let here = equations(inliers, &self.motion, &self.tangent, None);
             here.h - here.p
         };
-        let Some(apart) = contradiction(known, &self.motion.w(), &told, grown) else { return false };
+        let Some(apart) = contradiction(known, &self.motion.w(), &precision, grown) else { return false };
         self.covariance = Some(grown.covariance() + apart * apart.transpose());
         true
     }
@@ -162,6 +162,6 @@ pub(crate) fn moved(inliers: &Observations, at: &Weighted<'_>) -> Moved {
         // The first columns of `G` are those of the identity.
         sum += slopes(inliers, at.motion, at.tangent, at.nu[k], k) * (across * g.fixed_columns::<2>(0));
     }
-    let told = information(inliers, at.motion, at.tangent, at.nu, 0.0);
-    inverse(&told).map_or(Moved::zeros(), |inverse| inverse * sum)
+    let precision = information(inliers, at.motion, at.tangent, at.nu, 0.0);
+    inverse(&precision).map_or(Moved::zeros(), |inverse| inverse * sum)
 }

@@ -108,7 +108,7 @@ pub(crate) fn judge(
         || deviation.is_nan()
         || deviation > WIDE
         || far(inliers, &motions, deviation, evidence.deviation, rng.stream(1))
-        || otherwise_turned(whitening, inliers, solution, (deviation, evidence.deviation), rng.stream(2))
+        || has_other_rotation(whitening, inliers, solution, (deviation, evidence.deviation), rng.stream(2))
     {
         Status::IllConditioned
     } else if turned.is_some() || evidence.undecided.is_some() {
@@ -173,7 +173,7 @@ fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rn
 }
 
 /// The same for motions with a quite different rotation.
-fn otherwise_turned(
+fn has_other_rotation(
     whitening: &Whitening<'_>,
     inliers: &Observations,
     solution: &Solution,

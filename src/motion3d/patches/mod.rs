@@ -31,7 +31,7 @@ use crate::motion3d::solver::starts::{apart, evaluate, sample};
 use bootstrap::wider;
 use derotation::{beforehand, settle, turned_patch};
 use nalgebra::{DMatrix, Matrix3, Vector3};
-use report::{tell, turning_report};
+use report::{report_motion, turning_report};
 use shrinkage::shrunk;
 use status::{Evidence, judge};
 use std::collections::HashSet;
@@ -193,17 +193,17 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
         }
     }
     out.efficient = surfaces.is_some();
-    let told: Vec<Vector3<f64>> = match &surfaces {
+    let depths: Vec<Vector3<f64>> = match &surfaces {
         Some(surfaces) => surfaces.clone(),
         None => system.patches.iter().map(|patch| patch.seen(&motion).surface).collect(),
     };
-    let wider = if plugged.is_some() { wider(system, &motion, &told, out.efficient, rng.stream(2)) } else { 1.0 };
-    let displaced = (&system.moved(&motion, &told), &to_plane(patches.camera));
+    let wider = if plugged.is_some() { wider(system, &motion, &depths, out.efficient, rng.stream(2)) } else { 1.0 };
+    let displaced = (&system.moved(&motion, &depths), &to_plane(patches.camera));
     let common = |covariance| options.systematic_errors().on(&covariance, &motion, None, displaced);
     out.common = covariance.map_or_else(CommonEffect::default, common);
     covariance = covariance.map(|covariance| covariance * wider + out.common.added());
     let low = plugged.is_none() || wider > NONLINEAR;
-    let planar = tell(&mut out, system, &motion, covariance, surfaces.as_deref());
+    let planar = report_motion(&mut out, system, &motion, covariance, surfaces.as_deref());
     out.likelihood = Likelihood {
         motion: best,
         covariance: plugged.map_or(UNKNOWN, |plugged| nested(&plugged.likelihood)),

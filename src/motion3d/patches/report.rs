@@ -12,7 +12,7 @@ use crate::motion3d::solver::covariance::{direction_deviation, plugged};
 use nalgebra::{Matrix2, Vector3};
 
 /// Fills in the result of a motion; returns whether the patches are one plane that has another motion too.
-pub(crate) fn tell(
+pub(crate) fn report_motion(
     out: &mut MotionEstimate,
     system: &System,
     motion: &Motion,

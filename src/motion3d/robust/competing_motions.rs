@@ -2,7 +2,7 @@
 
 use super::cells::Cells;
 use super::depth_consistency::DepthConsistency;
-use super::graduated_weights::{GraduatedWeights, narrow};
+use super::graduated_weights::{GraduatedWeights, graduated};
 use super::{APART, CompetingMotion, FEWEST, INLIER, MAJORITY, cheaper_sign, inliers_of, mixture};
 use crate::math::random::CounterRng;
 use crate::motion3d::model::motion::Motion;
@@ -66,7 +66,7 @@ pub(crate) fn second(observations: &Observations, best: Motion, rng: CounterRng)
     let rest = observations.subset(&chosen.iter().map(|&place| rejected[place as usize]).collect::<Vec<u32>>());
     let found = GraduatedWeights::new(&rest).motions(1, rng).pop()?;
     let found = cheaper_sign(&rest, found).0;
-    Some(cheaper_sign(observations, narrow(observations, found, INLIER)))
+    Some(cheaper_sign(observations, graduated(observations, found, INLIER)))
 }
 
 /// Of the candidates, cheapest first, those that cost about as much as the first, or that have fewer

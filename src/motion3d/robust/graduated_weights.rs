@@ -13,9 +13,9 @@ use std::iter::once;
 const SPACING: f64 = 0.06;
 
 /// What the cut of Tukey's weights is divided by from one refinement to the next.
-const NARROWING: f64 = 1.6;
+const CUT_RATIO: f64 = 1.6;
 
-/// The same points, with rounder noise first: where it is far from round minima are too narrow for the
+/// The same points, with rounder noise first: where it is far from round minima are too graduated for the
 /// search.
 pub(crate) struct GraduatedWeights<'a> {
     rounder: Vec<Observations>,
@@ -32,25 +32,25 @@ impl<'a> GraduatedWeights<'a> {
         let first = self.rounder.first().unwrap_or(self.own);
         let bound = INLIER.max(SPACING * first.median_flow());
         let starts = apart(search::search(first, INLIER, SPACING, rng), APART, count);
-        starts.into_par_iter().map(|(start, _)| self.led(start, bound)).collect()
+        starts.into_par_iter().map(|(start, _)| self.descended(start, bound)).collect()
     }
 
-    fn led(&self, start: Motion, bound: f64) -> Motion {
+    fn descended(&self, start: Motion, bound: f64) -> Motion {
         let (mut motion, mut cut) = (start, bound);
         for points in self.rounder.iter().chain(once(self.own)) {
-            motion = narrow(points, motion, cut);
+            motion = graduated(points, motion, cut);
             cut = INLIER * LESS_ROUND;
         }
         motion
     }
 }
 
-/// Refines with Tukey's weights, which narrow from `bound` to the inliers'.
-pub(crate) fn narrow(observations: &Observations, start: Motion, bound: f64) -> Motion {
+/// Refines with Tukey's weights, which graduated from `bound` to the inliers'.
+pub(crate) fn graduated(observations: &Observations, start: Motion, bound: f64) -> Motion {
     let (mut motion, mut cut) = (start, bound);
     while cut > INLIER {
         motion = refine(observations, motion, Some(cut), StoppingCriteria::ROUGH).motion;
-        cut /= NARROWING;
+        cut /= CUT_RATIO;
     }
     refine(observations, motion, Some(INLIER), StoppingCriteria { steps: 30, tolerance: 1e-7, deviations: 0.0 }).motion
 }

@@ -6,7 +6,7 @@
 
 use super::cells::{Cells, Neighbourhoods};
 use super::graduated_weights::GraduatedWeights;
-use super::{APART, Candidates, CompetingMotion, EFFORT, INLIER, cheaper_sign, inliers_of, truncated};
+use super::{APART, Candidates, CompetingMotion, INLIER, STOPPING, cheaper_sign, inliers_of, truncated};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::equations;
 use crate::motion3d::model::motion::Motion;
@@ -110,7 +110,7 @@ fn of_scene(observations: &Observations, mut motion: Motion) -> Option<(Motion, 
         if (fitted.len() as f64) < least {
             return None;
         }
-        motion = refine(&observations.subset(&fitted), motion, None, EFFORT).motion;
+        motion = refine(&observations.subset(&fitted), motion, None, STOPPING).motion;
         fitted = inliers_of(observations, &motion);
     }
     (fitted.len() as f64 >= least).then_some((motion, fitted))

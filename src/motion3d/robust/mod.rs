@@ -40,7 +40,7 @@ use crate::motion3d::solver::starts::at_most;
 use cells::Cells;
 use competing_motions::{among_many_outliers, competing_motions, second};
 use depth_consistency::DepthConsistency;
-use graduated_weights::{GraduatedWeights, narrow};
+use graduated_weights::{GraduatedWeights, graduated};
 pub(crate) use leverage::has_high_leverage;
 pub(crate) use mixture::{EstimatedMotion, weighted_by_posterior};
 pub(crate) use noise_scale::larger;
@@ -60,7 +60,7 @@ const APART: f64 = 10.0;
 const SEARCHED: usize = 1000;
 
 /// When a motion of a set of inliers that is not final is reached.
-const EFFORT: StoppingCriteria = StoppingCriteria { steps: 60, tolerance: 1e-10, deviations: 1e-2 };
+const STOPPING: StoppingCriteria = StoppingCriteria { steps: 60, tolerance: 1e-10, deviations: 1e-2 };
 
 /// A relative change of the noise that does not change the inliers.
 const SETTLED_NOISE: f64 = 0.02;
@@ -72,7 +72,7 @@ const ROUNDS: usize = 10;
 const FEW_ROUNDS: usize = 4;
 
 /// Rounds of the depth-consistency test.
-const GATES: usize = 2;
+const DEPTH_ROUNDS: usize = 2;
 
 /// Share of outliers among the inliers from which on they matter for the search.
 const MATTER: f64 = 0.03;
@@ -189,7 +189,7 @@ fn with_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -
 /// One search in the present noise, which is estimated again from the best candidate's residuals if it is
 /// `unknown`; then all other tests of that candidate run once.
 fn in_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, unknown: bool, rng: CounterRng) -> Option<Consensus> {
-    let mut candidates = searched(&first_asked(&scaled.observations, rng), rng)?;
+    let mut candidates = searched(&search_sample(&scaled.observations, rng), rng)?;
     let few = scaled.observations.n < SELECTED;
     for _ in 0..if few { FEW_ROUNDS } else { ROUNDS } {
         // A robust fit of few points follows those that agree by chance: their noise is that of all inliers.
@@ -209,12 +209,12 @@ fn in_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, unknown: bool, rng: 
         if !changed {
             break;
         }
-        let on = first_asked(&scaled.observations, rng);
+        let on = search_sample(&scaled.observations, rng);
         if few {
             candidates = searched(&on, rng)?;
             continue;
         }
-        let again = |(motion, _): &(Motion, f64)| cheaper_sign(&on, narrow(&on, *motion, INLIER));
+        let again = |(motion, _): &(Motion, f64)| cheaper_sign(&on, graduated(&on, *motion, INLIER));
         candidates = candidates.iter().map(again).collect();
         candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
     }
@@ -223,7 +223,7 @@ fn in_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, unknown: bool, rng: 
 
 /// Finds the inliers of the best candidate, and competing motions.
 fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: CounterRng) -> Option<Consensus> {
-    let on = &*first_asked(observations, rng);
+    let on = &*search_sample(observations, rng);
     if keeps("motion3d.second_motion") {
         candidates.extend(second(on, candidates.first()?.0, rng.stream(10)));
         candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -233,12 +233,12 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
     let mut found = settle(observations, best)?;
     let cells = Cells::new(observations);
     let gate = DepthConsistency::new(observations, &cells);
-    for _ in 0..if keeps("motion3d.depth_gate") { GATES } else { 0 } {
+    for _ in 0..if keeps("motion3d.depth_gate") { DEPTH_ROUNDS } else { 0 } {
         let (kept, _) = gate.passed(&found);
         if kept.len() < MIN_POINTS || kept.len() == found.inliers.len() {
             break;
         }
-        let motion = refine(&observations.subset(&kept), found.motion, None, EFFORT).motion;
+        let motion = refine(&observations.subset(&kept), found.motion, None, STOPPING).motion;
         let fitted = inliers_of(observations, &motion);
         found = Consensus::new(motion, fitted);
     }
@@ -283,7 +283,7 @@ fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRn
     if !observations.independent || !keeps("motion3d.residual_structure") {
         return found;
     }
-    let mut on = first_asked(observations, rng);
+    let mut on = search_sample(observations, rng);
     let inner = on.n == observations.n;
     // Residuals that are cut off at too small a noise do not pull the estimate.
     let variance = larger(observations, &found.motion);
@@ -298,7 +298,7 @@ fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRn
 }
 
 /// The points that a search begins with.
-fn first_asked(observations: &Observations, rng: CounterRng) -> Cow<'_, Observations> {
+fn search_sample(observations: &Observations, rng: CounterRng) -> Cow<'_, Observations> {
     at_most(observations, SEARCHED, rng.stream(9))
 }
 
@@ -334,7 +334,7 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
         if inliers.len() < MIN_POINTS {
             return None;
         }
-        motion = refine(&observations.subset(&inliers), motion, None, EFFORT).motion;
+        motion = refine(&observations.subset(&inliers), motion, None, STOPPING).motion;
         let next = inliers_of(observations, &motion);
         // Of many points a few always lie on the border.
         let settled = next == inliers

@@ -2,7 +2,7 @@
 //! pull it towards theirs.
 
 use super::cells::{Cells, NEAREST, Neighbourhoods};
-use super::{Consensus, EFFORT, MIN_POINTS, inliers_of};
+use super::{Consensus, MIN_POINTS, STOPPING, inliers_of};
 use crate::math::median;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::solver::refine::refine;
@@ -67,7 +67,7 @@ fn without(observations: &Observations, found: &Consensus, around: &Neighbourhoo
         if kept == inliers || kept.len() < MIN_POINTS {
             break;
         }
-        motion = refine(&observations.subset(&kept), motion, None, EFFORT).motion;
+        motion = refine(&observations.subset(&kept), motion, None, STOPPING).motion;
         inliers = kept;
         has_inlier_neighbours = rejected.iter().map(|&share| share <= limit).collect();
     }

@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn a_part_with_another_rotation_pulls_apart_and_noise_does_not() {
         let all: Vec<u32> = (0..400).collect();
-        let (mut chance, mut told) = (0, 0);
+        let (mut chance, mut found) = (0, 0);
         for seed in 0..200 {
             let mut scene = Scene::oblique(400, 0.02, seed);
             chance += u32::from(!deviating_parts(&scene.observations(), &oblique(), &all).is_empty());
@@ -96,9 +96,9 @@ mod tests {
                 let (before, after) = (oblique().plane_flow(at, nu), turned.plane_flow(at, nu));
                 scene.flow[k] = [0, 1].map(|j| scene.flow[k][j] + after[j] - before[j]);
             }
-            told += u32::from(!deviating_parts(&scene.observations(), &oblique(), &all).is_empty());
+            found += u32::from(!deviating_parts(&scene.observations(), &oblique(), &all).is_empty());
         }
-        assert!(chance <= 6 && told >= 150, "{chance} {told}");
+        assert!(chance <= 6 && found >= 150, "{chance} {found}");
     }
 
     #[test]

@@ -39,9 +39,9 @@ pub(crate) struct Efficient {
 impl Efficient {
     /// The covariance with what a curved profile likelihood adds, and whether it describes that.
     pub fn lengthened(&self, observations: &Observations, smoother: impl Fn() -> DepthSmoother) -> (Matrix5, bool) {
-        let valley = ProfileLikelihood { observations, motion: &self.motion, tangent: &self.tangent };
+        let profile = ProfileLikelihood { observations, motion: &self.motion, tangent: &self.tangent };
         let mut made = None;
-        valley.lengthened(&self.covariance, |motion: &Motion| {
+        profile.lengthened(&self.covariance, |motion: &Motion| {
             if self.variance.is_none() {
                 return self.smooth.clone();
             }

@@ -39,7 +39,7 @@ const ROUNDING: f64 = 1e-13;
 const HIDDEN: f64 = 0.1;
 
 /// Root mean square of the rest, in units of noise, that changes few inliers.
-const OBEYING: f64 = 0.1;
+const MAX_REST: f64 = 0.1;
 
 /// Most times that rows are turned about what they gave.
 const ROUNDS: usize = 6;
@@ -115,7 +115,7 @@ pub(crate) fn decides(whitening: &Whitening<'_>, points: &Observations, motion: 
         return false;
     }
     let (_, changes) = changes(whitening, points, motion);
-    changes.iter().map(|change| change * change).sum::<f64>() > OBEYING * OBEYING * changes.len() as f64
+    changes.iter().map(|change| change * change).sum::<f64>() > MAX_REST * MAX_REST * changes.len() as f64
 }
 
 /// The points with a rotation taken out that explains most of the flow by itself, of all points or (`robust`)

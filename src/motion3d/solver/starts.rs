@@ -126,11 +126,11 @@ fn basins(observations: &Observations, all: &[(Motion, f64)], rng: CounterRng) -
         return Vec::new();
     }
     let few = &*at_most(observations, FEW, rng);
-    let led = |&(motion, _): &(Motion, f64)| {
+    let descended = |&(motion, _): &(Motion, f64)| {
         let minimum = refine(few, motion, None, STEPS);
         (minimum.motion, minimum.equations.cost)
     };
-    apart(all.to_vec(), APART, all.len()).par_iter().with_min_len(TOGETHER).map(led).collect()
+    apart(all.to_vec(), APART, all.len()).par_iter().with_min_len(TOGETHER).map(descended).collect()
 }
 
 /// Directions all over a narrow picture and somewhat beyond it, none of a wide one; and the picture's half

@@ -44,7 +44,7 @@ impl Errors {
     /// Fitting a motion takes what looks like one out of the residuals: of errors with the correlations `R`
     /// they have the covariance `(I - H) R (I - H)^t`, `H = W A^-1 W^t`. The shortest stretch is taken for
     /// which that makes residuals of neighbours as alike as they are.
-    pub fn told_by_residuals(points: &Neighbourhood, inverse: &Matrix5, own: f64) -> Self {
+    pub fn from_residuals(points: &Neighbourhood, inverse: &Matrix5, own: f64) -> Self {
         let squares: f64 = points.all.iter().map(|point| point.residual.powi(2)).sum();
         let near = points.near();
         let alike = near.alike / squares;

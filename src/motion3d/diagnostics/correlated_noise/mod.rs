@@ -59,14 +59,14 @@ pub(crate) fn correlated_covariance(
 ) -> Option<Matrix5> {
     let squares = information(inliers, at.motion, at.tangent, at.nu, 0.0);
     let points = Neighbourhood::new(inliers, at, flow, length);
-    let errors = Errors::told_by_residuals(&points, &inverse(&squares)?, inliers.own());
+    let errors = Errors::from_residuals(&points, &inverse(&squares)?, inliers.own());
     let l = squares.cholesky()?.l();
     let back = l.try_inverse()?;
     let larger = Matrix5::identity() + positive(&(back * correlation_excess(&points, &errors) * back.transpose()));
-    let told = l.transpose() * covariance * l;
-    let told = SymmetricEigen::new(0.5 * (told + told.transpose()));
-    let root = told.eigenvalues.map(|size| size.max(0.0).sqrt());
-    let root = told.eigenvectors * Matrix5::from_diagonal(&root) * told.eigenvectors.transpose();
+    let normalised = l.transpose() * covariance * l;
+    let normalised = SymmetricEigen::new(0.5 * (normalised + normalised.transpose()));
+    let root = normalised.eigenvalues.map(|size| size.max(0.0).sqrt());
+    let root = normalised.eigenvectors * Matrix5::from_diagonal(&root) * normalised.eigenvectors.transpose();
     let out = back.transpose() * root * larger * root * back;
     let out = 0.5 * (out + out.transpose());
     inverse(&out).map(|_| out)
@@ -84,7 +84,7 @@ pub(crate) fn correlated_rotation_covariance(
     inverse.fixed_view_mut::<3, 3>(2, 2).copy_from(covariance);
     let of_axis = |axis: usize| {
         let points = Neighbourhood::of_rotation(inliers, w, axis, flow, length);
-        correlation_excess(&points, &Errors::told_by_residuals(&points, &inverse, inliers.own()))
+        correlation_excess(&points, &Errors::from_residuals(&points, &inverse, inliers.own()))
     };
     inverse += inverse * positive(&(of_axis(0) + of_axis(1))) * inverse;
     inverse.fixed_view::<3, 3>(2, 2).into_owned()

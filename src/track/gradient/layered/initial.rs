@@ -72,7 +72,7 @@ impl InitialSegmentation {
     /// A frame beside the first.
     pub fn changes(&self, frame: &Frame<f64>, noise: f64) -> Changes<'_> {
         let now = Patch::cut(frame, self.cut).frame;
-        Changes { outset: self, now, bar: CHANGE * noise * std::f64::consts::SQRT_2 }
+        Changes { segmentation: self, now, bar: CHANGE * noise * std::f64::consts::SQRT_2 }
     }
 
     /// A frame that is looked at.
@@ -103,7 +103,7 @@ impl InitialSegmentation {
 
 /// A later frame beside the first.
 pub(super) struct Changes<'a> {
-    pub outset: &'a InitialSegmentation,
+    pub segmentation: &'a InitialSegmentation,
     pub now: Frame<f64>,
     /// Largest change that noise makes, grey levels.
     pub bar: f64,
@@ -114,7 +114,7 @@ impl Changes<'_> {
     pub fn inside(&self, every: usize) -> impl Iterator<Item = [usize; 2]> {
         let (width, height) = self.now.size();
         let all = (0..height).step_by(every).flat_map(move |y| (0..width).step_by(every).map(move |x| [x, y]));
-        all.filter(|[x, y]| self.outset.inside.get(*x, *y))
+        all.filter(|[x, y]| self.segmentation.inside.get(*x, *y))
     }
 
     /// A pixel of the patch moved on; `None` beyond the patch.
@@ -127,13 +127,13 @@ impl Changes<'_> {
 
     /// Change at a pixel, grey levels.
     pub fn at_rest(&self, [x, y]: [usize; 2]) -> f64 {
-        (self.now.get(x, y) - self.outset.first.frame.get(x, y)).abs()
+        (self.now.get(x, y) - self.segmentation.first.frame.get(x, y)).abs()
     }
 
     /// Change from what was at one pixel to what is at another, but for what fractions of a pixel make, grey
     /// levels.
     pub fn along(&self, from: [usize; 2], to: [usize; 2]) -> f64 {
-        beyond(self.outset.between.get(from[0], from[1]), self.now.get(to[0], to[1]))
+        beyond(self.segmentation.between.get(from[0], from[1]), self.now.get(to[0], to[1]))
     }
 
     /// What noise does not make of a change.
@@ -144,14 +144,14 @@ impl Changes<'_> {
     /// The smallest displacement of the box that explains nearly as much as any; `None` where nothing moves,
     /// or not as a whole.
     pub fn displacement(&self) -> Option<[isize; 2]> {
-        let InitialSegmentation { inside, frames, moved, .. } = self.outset;
+        let InitialSegmentation { inside, frames, moved, .. } = self.segmentation;
         let (now, before) = (*frames as isize, *frames as isize - 1);
         let (middle, reach) =
             if before == 0 { ([0; 2], REACH[0]) } else { (moved.map(|m| m * now / before), REACH[1]) };
         let beside = self.beside();
         let area = inside.data().iter().filter(|inside| **inside).count();
         let every = (area as f64 / VOTES).sqrt().ceil().max(1.0) as usize;
-        let voting: Vec<_> = self.inside(every).map(|at| (at, self.outset.between.get(at[0], at[1]))).collect();
+        let voting: Vec<_> = self.inside(every).map(|at| (at, self.segmentation.between.get(at[0], at[1]))).collect();
         let rests = self.rests();
         let cost = |d: [isize; 2]| beside + (every * every) as f64 * self.within(d, &voting, &rests);
         let rest = cost([0; 2]);
@@ -160,7 +160,7 @@ impl Changes<'_> {
             .map(|d| (cost(d), d))
             .collect();
         let best = all.iter().map(|(cost, _)| *cost).fold(f64::INFINITY, f64::min);
-        let bar = best + NEARLY[0] * best + NEARLY[1] * self.contrast() * self.outset.side();
+        let bar = best + NEARLY[0] * best + NEARLY[1] * self.contrast() * self.segmentation.side();
         if rest <= bar || best > MAX_CHANGE_LEFT * rest {
             return None;
         }
@@ -170,7 +170,8 @@ impl Changes<'_> {
 
     /// Change beside the box, grey levels.
     fn beside(&self) -> f64 {
-        let pixels = self.now.data().iter().zip(self.outset.first.frame.data()).zip(self.outset.inside.data());
+        let pixels =
+            self.now.data().iter().zip(self.segmentation.first.frame.data()).zip(self.segmentation.inside.data());
         pixels.filter(|(_, inside)| !**inside).map(|((now, first), _)| self.excess((now - first).abs())).sum()
     }
 
@@ -180,7 +181,7 @@ impl Changes<'_> {
         let (width, height) = self.now.size();
         Frame::from_fn(width, height, |x, y| {
             let rest = self.excess(self.at_rest([x, y]));
-            [rest, if self.outset.inside.get(x, y) { 0.0 } else { rest }]
+            [rest, if self.segmentation.inside.get(x, y) { 0.0 } else { rest }]
         })
     }
 
@@ -197,7 +198,7 @@ impl Changes<'_> {
 
     /// Mean of the changes that noise does not make, grey levels.
     fn contrast(&self) -> f64 {
-        let pixels = self.now.data().iter().zip(self.outset.first.frame.data());
+        let pixels = self.now.data().iter().zip(self.segmentation.first.frame.data());
         let changes = pixels.map(|(now, first)| self.excess((now - first).abs())).filter(|change| *change > 0.0);
         let (sum, count) = changes.fold((0.0, 0.0), |(sum, count), change| (sum + change, count + 1.0));
         if count > 0.0 { sum / count } else { MAX_CHANGE }

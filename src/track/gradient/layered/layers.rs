@@ -21,7 +21,7 @@ pub(super) const CORE: f64 = 0.6;
 /// Distance from the support at which points still count, px of the target.
 const NEAR: f64 = 2.0;
 /// Difference of the support's sides from the first box's that changes nothing, share.
-const BELIEVED: f64 = 0.2;
+const MAX_CHANGE: f64 = 0.2;
 /// Support that distances are counted from.
 const EDGE: f64 = 0.1;
 
@@ -114,7 +114,7 @@ impl Target {
             .into_iter()
             .zip(self.size)
             .map(|(extent, first)| {
-                if crate::ablation::keeps("gradient.first_extent") && (extent / first - 1.0).abs() < BELIEVED {
+                if crate::ablation::keeps("gradient.first_extent") && (extent / first - 1.0).abs() < MAX_CHANGE {
                     first
                 } else {
                     extent

@@ -65,8 +65,8 @@ pub(super) fn find_occluder(initial: &mut InitialSegmentation, frame: &Frame<f64
 fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<bool>> {
     let evidence = Evidence::of(changes, moved);
     let look = Appearance::of(changes, &evidence.moving)?;
-    let fewest = EDGE * changes.outset.side() * ((moved[0] as f64).hypot(moved[1] as f64) - 1.0);
-    let first = &changes.outset.first.frame;
+    let fewest = EDGE * changes.segmentation.side() * ((moved[0] as f64).hypot(moved[1] as f64) - 1.0);
+    let first = &changes.segmentation.first.frame;
     let (mut still, mut agreed) = (Vec::new(), 0);
     for &(from, to) in &evidence.edge {
         let came = look.holds(changes.now.get(to[0], to[1]), to);
@@ -82,7 +82,7 @@ fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<bool>> {
     let hidden = spread(changes, &evidence.moving, &still);
     let (share, apart) = parts(changes, &hidden);
     let cut = (HIDDEN_SHARE_RANGE[0]..HIDDEN_SHARE_RANGE[1]).contains(&share)
-        && apart > MIN_CENTER_DISTANCE * changes.outset.side();
+        && apart > MIN_CENTER_DISTANCE * changes.segmentation.side();
     (cut && is_so(changes, &hidden, moved)).then_some(hidden)
 }
 
@@ -132,7 +132,7 @@ impl Evidence {
         for from in changes.inside(1) {
             let Some(to) = changes.on(from, moved) else { continue };
             let (along, here, there) = (changes.along(from, to), changes.at_rest(from), changes.at_rest(to));
-            let stays = here <= changes.bar || there <= changes.bar && changes.outset.inside.get(to[0], to[1]);
+            let stays = here <= changes.bar || there <= changes.bar && changes.segmentation.inside.get(to[0], to[1]);
             if along <= changes.bar && here.max(there) > clear {
                 moving.push(from);
             } else if stays && unlike_all_around(changes, from, to) > clear {
@@ -146,7 +146,7 @@ impl Evidence {
 /// Change from what was at a pixel or beside it to what is at another: displacements are right to a pixel,
 /// and targets turn and grow.
 fn unlike_all_around(changes: &Changes<'_>, [x, y]: [usize; 2], [i, j]: [usize; 2]) -> f64 {
-    let first = &changes.outset.first.frame;
+    let first = &changes.segmentation.first.frame;
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for row in wide(y, 1, first.height()) {
         for value in &first.row(row)[wide(x, 1, first.width())] {
@@ -166,13 +166,13 @@ struct Appearance {
 
 impl Appearance {
     fn of(changes: &Changes<'_>, moving: &[[usize; 2]]) -> Option<Self> {
-        let first = &changes.outset.first.frame;
+        let first = &changes.segmentation.first.frame;
         let (width, height) = first.size();
         let mut known = Frame::filled(width, height, f64::NAN);
         for [x, y] in moving {
             known.row_mut(*y)[*x] = first.get(*x, *y);
         }
-        let mean = smooth_known(&known, (WIDTH.0 * changes.outset.side()).max(WIDTH.1));
+        let mean = smooth_known(&known, (WIDTH.0 * changes.segmentation.side()).max(WIDTH.1));
         let mut off: Vec<f64> = moving.iter().map(|[x, y]| (first.get(*x, *y) - mean.get(*x, *y)).abs()).collect();
         let scatter = robust_std(&mut off).unwrap_or(0.0);
         (moving.len() >= MIN_PAIRS).then(|| Self {
@@ -192,13 +192,13 @@ impl Appearance {
 
 /// Mean brightness around the box in the first frame, grey levels.
 fn behind(changes: &Changes<'_>) -> f64 {
-    let inside = &changes.outset.inside;
+    let inside = &changes.segmentation.inside;
     let (width, height) = inside.size();
     let (mut sum, mut count) = (0.0, 0.0);
     for y in 0..height {
         for x in (0..width).filter(|x| !inside.get(*x, y)) {
             if wide(y, AROUND, height).any(|j| inside.row(j)[wide(x, AROUND, width)].contains(&true)) {
-                sum += changes.outset.first.frame.get(x, y);
+                sum += changes.segmentation.first.frame.get(x, y);
                 count += 1.0;
             }
         }
@@ -209,7 +209,7 @@ fn behind(changes: &Changes<'_>) -> f64 {
 /// Every pixel of the box belongs to the nearer of what moves and of what is still, by ways that avoid steps
 /// of brightness.
 fn spread(changes: &Changes<'_>, moving: &[[usize; 2]], still: &[[usize; 2]]) -> Frame<bool> {
-    let first = &changes.outset.first.frame;
+    let first = &changes.segmentation.first.frame;
     let (width, height) = first.size();
     let mut hidden = Frame::filled(width, height, false);
     let mut reached = Frame::filled(width, height, u64::MAX);
@@ -226,7 +226,7 @@ fn spread(changes: &Changes<'_>, moving: &[[usize; 2]], still: &[[usize; 2]]) ->
         }
         hidden.row_mut(y)[x] = label;
         for (i, j) in [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)] {
-            if i >= width || j >= height || !changes.outset.inside.get(i, j) {
+            if i >= width || j >= height || !changes.segmentation.inside.get(i, j) {
                 continue;
             }
             let step = (first.get(i, j) - first.get(x, y)) / changes.bar;
@@ -269,8 +269,8 @@ mod tests {
     /// What is found when the square has moved once.
     fn found_in(bounds: TargetBox, moved: [usize; 2], hidden_to: usize) -> Option<HiddenPart> {
         let first = scene([0; 2], hidden_to, 1);
-        let mut outset = InitialSegmentation::new(&first, bounds, Target::new(&first, bounds, 144.0));
-        find_occluder(&mut outset, &scene(moved, hidden_to, 2), 1.5)
+        let mut segmentation = InitialSegmentation::new(&first, bounds, Target::new(&first, bounds, 144.0));
+        find_occluder(&mut segmentation, &scene(moved, hidden_to, 2), 1.5)
     }
 
     fn exact() -> TargetBox {

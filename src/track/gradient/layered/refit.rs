@@ -99,7 +99,7 @@ impl Changes<'_> {
     /// Whether what lies in only one of the box and the outline of what moves did as it should: in the box
     /// alone it stayed and does not look like the target, in the outline alone it moved along.
     fn are_explained(&self, first: &TargetBox, found: &MovingTarget) -> bool {
-        let corner = self.outset.first.corner;
+        let corner = self.segmentation.first.corner;
         let d = found.displacement.map(|d| d as isize);
         let (outline, core, now) =
             (grown(*first, (0.0, 1.0)), grown(*first, (0.0, -1.0)), grown(found.bounds, (0.0, 1.0)));
@@ -111,8 +111,8 @@ impl Changes<'_> {
         let (width, height) = self.now.size();
         for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
             let at = (x + corner[0], y + corner[1]);
-            let in_box = self.outset.inside.get(x, y);
-            let like = is_usual(self.outset.first.frame.get(x, y));
+            let in_box = self.segmentation.inside.get(x, y);
+            let like = is_usual(self.segmentation.first.frame.get(x, y));
             if holds(&rim, at.0, at.1) && !holds(&outline, at.0, at.1) {
                 around += 1;
                 alike += usize::from(like);
@@ -137,11 +137,11 @@ impl Changes<'_> {
 
     /// Usual range of the brightness in a part of the first frame, grey levels.
     fn brightness_range(&self, part: &TargetBox) -> [f64; 2] {
-        let corner = self.outset.first.corner;
+        let corner = self.segmentation.first.corner;
         let (width, height) = self.now.size();
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let inside = pixels.filter(|(x, y)| holds(part, x + corner[0], y + corner[1]));
-        let mut values: Vec<f64> = inside.map(|(x, y)| self.outset.first.frame.get(x, y)).collect();
+        let mut values: Vec<f64> = inside.map(|(x, y)| self.segmentation.first.frame.get(x, y)).collect();
         values.sort_by(f64::total_cmp);
         let last = values.len().saturating_sub(1) as f64;
         USUAL.map(|share| values.get((share * last).round() as usize).copied().unwrap_or(f64::NAN))
@@ -179,8 +179,8 @@ mod tests {
 
     fn found_in(bounds: TargetBox, moved: [usize; 2], hidden_to: usize, level: f64) -> Option<TargetBox> {
         let first = scene([0; 2], hidden_to, level, 1);
-        let outset = InitialSegmentation::new(&first, bounds, Target::new(&first, bounds, PRIOR));
-        outset.refitted(&scene(moved, hidden_to, level, 2), NOISE).map(|found| found.bounds)
+        let segmentation = InitialSegmentation::new(&first, bounds, Target::new(&first, bounds, PRIOR));
+        segmentation.refitted(&scene(moved, hidden_to, level, 2), NOISE).map(|found| found.bounds)
     }
 
     fn exact(by: [f64; 2], larger: f64) -> TargetBox {

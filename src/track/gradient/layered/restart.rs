@@ -22,14 +22,16 @@ const STILL_CHANGE_PER_NOISE: f64 = 4.0;
 
 /// Looks whether the frame decides what the first box held.
 pub(super) fn resolve_initial(state: &mut State, frame: &Frame<f64>, motion: [f64; 2]) {
-    let Some(mut outset) = state.initial.take().filter(|_| motion == [0.0; 2]) else { return };
-    match find_occluder(&mut outset, frame, state.scene.noise) {
-        Some(found) => restart_occluded(state, &outset, &found, frame),
+    let Some(mut segmentation) = state.initial.take().filter(|_| motion == [0.0; 2]) else { return };
+    match find_occluder(&mut segmentation, frame, state.scene.noise) {
+        Some(found) => restart_occluded(state, &segmentation, &found, frame),
         None => {
-            match box_of_motion(state, &outset, frame).filter(|_| crate::ablation::keeps("gradient.start_refitted")) {
-                Some(found) => restart_with_box(state, &found, frame, outset.frames()),
-                None if outset.is_over() => {}
-                None => state.initial = Some(outset),
+            match box_of_motion(state, &segmentation, frame)
+                .filter(|_| crate::ablation::keeps("gradient.start_refitted"))
+            {
+                Some(found) => restart_with_box(state, &found, frame, segmentation.frames()),
+                None if segmentation.is_over() => {}
+                None => state.initial = Some(segmentation),
             }
         }
     }
@@ -37,26 +39,30 @@ pub(super) fn resolve_initial(state: &mut State, frame: &Frame<f64>, motion: [f6
 
 /// The box of what moves, unless the target turned, which changes the outline as well. Its size says
 /// nothing: a box beside the target makes that seem to change.
-pub(super) fn box_of_motion(state: &State, outset: &InitialSegmentation, frame: &Frame<f64>) -> Option<MovingTarget> {
-    if state.motion.rotation.abs() < TURNED { outset.refitted(frame, state.scene.noise) } else { None }
+pub(super) fn box_of_motion(
+    state: &State,
+    segmentation: &InitialSegmentation,
+    frame: &Frame<f64>,
+) -> Option<MovingTarget> {
+    if state.motion.rotation.abs() < TURNED { segmentation.refitted(frame, state.scene.noise) } else { None }
 }
 
 pub(super) fn restart_occluded(
     state: &mut State,
-    outset: &InitialSegmentation,
+    segmentation: &InitialSegmentation,
     found: &HiddenPart,
     frame: &Frame<f64>,
 ) {
-    let at = outset.bounds.centre();
-    state.target = outset.target.clone();
-    let ([x0, y0], (width, height)) = (outset.first.corner, found.hidden.size());
+    let at = segmentation.bounds.centre();
+    state.target = segmentation.target.clone();
+    let ([x0, y0], (width, height)) = (segmentation.first.corner, found.hidden.size());
     state.target.hide(|xi| {
         let pixel = |at: f64, corner: usize, length: usize| {
             ((at + 0.5).floor() - corner as f64).clamp(0.0, length as f64 - 1.0) as usize
         };
         found.hidden.get(pixel(at[0] + xi[0], x0, width), pixel(at[1] + xi[1], y0, height))
     });
-    state.background.begin_anew(outset, found, frame, STILL_CHANGE_PER_NOISE * state.scene.noise);
+    state.background.begin_anew(segmentation, found, frame, STILL_CHANGE_PER_NOISE * state.scene.noise);
     restart_at(state, [at[0] + found.moved[0], at[1] + found.moved[1]], found.moved, found.frames);
     (state.history.occluded, state.history.age, state.history.adapts_until) = (true, SETTLING_FRAMES, 0);
 }
@@ -89,7 +95,10 @@ pub(super) fn restart_at(state: &mut State, centre: [f64; 2], moved: [f64; 2], f
 /// As long as the first box is undecided, what is reported of the way since then may
 /// be wrong by as much as the displacement of all that moved differs from it.
 pub(super) fn update_displacement_uncertainty(state: &mut State) {
-    let told = state.initial.as_ref().and_then(|outset| outset.moved().map(|moved| (moved, outset.bounds.centre())));
+    let told = state
+        .initial
+        .as_ref()
+        .and_then(|segmentation| segmentation.moved().map(|moved| (moved, segmentation.bounds.centre())));
     let Some((moved, first)) = told else { return state.uncertainty.displacement = [0.0; 2] };
     let (at, size) = (state.motion.filter.position(), state.target.size);
     // The sides of what grows move differently from its middle.
@@ -127,17 +136,17 @@ impl Target {
 
 impl Background {
     /// What was seen around the first box, and beside the target where that is `now`.
-    fn begin_anew(&mut self, outset: &InitialSegmentation, found: &HiddenPart, frame: &Frame<f64>, bar: f64) {
-        let bounds = outset.bounds;
+    fn begin_anew(&mut self, segmentation: &InitialSegmentation, found: &HiddenPart, frame: &Frame<f64>, bar: f64) {
+        let bounds = segmentation.bounds;
         let there = TargetBox { x: bounds.x + found.moved[0], y: bounds.y + found.moved[1], ..bounds };
         let (first, now) = (grown(bounds, UNSEEN), grown(there, UNSEEN));
-        let [x0, y0] = outset.first.corner;
+        let [x0, y0] = segmentation.first.corner;
         let (width, height) = found.hidden.size();
         for j in 0..height {
             for i in 0..width {
-                let (x, y, was) = (x0 + i, y0 + j, outset.first.frame.get(i, j));
+                let (x, y, was) = (x0 + i, y0 + j, segmentation.first.frame.get(i, j));
                 let is = frame.get(x, y);
-                let beside = !outset.inside.get(i, j) && (was - is).abs() < bar;
+                let beside = !segmentation.inside.get(i, j) && (was - is).abs() < bar;
                 let (value, known) = if !holds(&first, x, y) || found.hidden.get(i, j) || beside {
                     (was, true)
                 } else {

@@ -137,10 +137,10 @@ impl LocalLoop {
     /// The next frame; `None`: it cannot be used.
     pub fn update(&mut self, frame: Option<&Frame<f64>>, state: &mut TrackState) {
         let second = frame.map(|frame| self.cut(frame));
-        let told = second.as_ref().map(|second| self.measure(second));
-        let (found, ends) = (told.map(|told| told.mean), told.and_then(|told| told.ends));
+        let measured = second.as_ref().map(|second| self.measure(second));
+        let (found, ends) = (measured.map(|measured| measured.mean), measured.and_then(|measured| measured.ends));
         self.flow_count = found.map_or(0, |mean| mean.count);
-        let all_moves = told.is_some_and(|told| told.all_moves);
+        let all_moves = measured.is_some_and(|measured| measured.all_moves);
         let was_lost = self.missed >= MAX_MISSED_FRAMES;
         self.filter.predict();
         let (mut innovation, mut measured) = (f64::NAN, false);
