@@ -15,9 +15,7 @@ use jacoflow::synth::{AffineTexture, Scene, Sensor};
 use jacoflow::types::{FlowField, Frame, Rect, SamplingGrid, Status};
 use nalgebra::{Matrix6, Vector6};
 
-#[path = "windowed/calibration.rs"]
 mod calibration;
-#[path = "windowed/efficiency.rs"]
 mod efficiency;
 
 /// Rows of `[J(i); J(i')]` and of `[i'; i'']` of one pixel, as the specification of the method writes them.
