@@ -30,8 +30,9 @@ def main() -> int:
         if (ROOT / name).exists():
             shutil.copy(ROOT / name, COPY / name)
     shutil.copytree(ROOT / "src", COPY / "src")
-    # Numbers that unit tests compare with.
-    shutil.copytree(ROOT / "tests" / "golden", COPY / "tests" / "golden")
+    # Numbers that unit tests compare with, and scenes that they share with the tests of the public interface.
+    for part in ("golden", "motion3d"):
+        shutil.copytree(ROOT / "tests" / part, COPY / "tests" / part)
     # Only the library is built: its benches stay behind, and so must their declarations. Compiling it takes longer than the tests: not optimised.
     manifest = re.sub(r"\[\[bench\]\]\n(?:[^\[].*\n|\n)*", "", (COPY / "Cargo.toml").read_text())
     (COPY / "Cargo.toml").write_text(manifest + "\n[workspace]\n\n[profile.ci.package.jacoflow]\nopt-level = 0\n")
