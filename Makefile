@@ -15,7 +15,7 @@ test: format clippy features rustdoc rust-test guide pytest stubtest typing exam
 
 # The main job on an embedded example.
 demo:
-	cargo run $(CI) -- demo
+	cargo run -- demo
 
 format:
 	cargo fmt --check
