@@ -70,7 +70,7 @@ fn scatter_and_shared_windows_enlarge_the_deviation() {
 
 #[test]
 fn what_is_claimed_and_does_not_scatter_is_common() {
-    // An error of one claimed deviation in every u, and hardly any scatter.
+    // An error of one claimed deviation in every u, and next to no scatter.
     let mut biased = field(0.001, 0.05, 3);
     let n = biased.len();
     biased.motion[..n].iter_mut().for_each(|u| *u += 0.05);

@@ -1,4 +1,4 @@
-//! Numbered things drawn over a view: their pixels in colours of their own, their numbers, their motions.
+//! Numbered objects drawn over a view: their pixels in colours of their own, their numbers, their motions.
 
 use jacoflow::image::picture::{ClusterMark, Picture, Rgb, cluster_picture, identity_colour};
 

@@ -1,4 +1,4 @@
-//! Numbered things drawn over a view: their pixels in colours of their own, their numbers, their motions.
+//! Numbered objects drawn over a view: their pixels in colours of their own, their numbers, their motions.
 
 use super::digits::draw_number;
 use super::{Arrow, Picture, Quiver, Rgb};
