@@ -25,7 +25,7 @@ def test_a_drive_is_better_than_five_points_on_tracks():
 @pytest.mark.skipif(not (DATA / "kitti_odometry").is_dir(), reason="no recordings")
 def test_halves_of_the_picture_differ_by_what_their_covariances_say():
     """Twenty pairs and four ways to halve: of 17 that are right, three outside of 95 % ellipsoids by chance are rarer than one in twenty."""
-    rows = recordings.spacings(DATA, spacings=(16,), presets=("balanced",))
+    rows = recordings.spacings(DATA, spacings=(16,))
     for row in rows:
         assert row["ok"] >= 17 and row["share within 95 %"] >= 0.88 and row["mean"] < 1.2, row
     # Independent points are what the covariance would lie with.
