@@ -4,7 +4,7 @@ use super::confidence_region::{Farther, plausible_beyond, plausible_less_turned}
 use super::planar_twin::planar_twin;
 use super::solution::Solution;
 use crate::math::random::CounterRng;
-use crate::motion3d::kernels::{FrontEquations, equations, front_equations};
+use crate::motion3d::kernels::{equations, front_equations};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::result::{Alternative, Status};
@@ -230,21 +230,21 @@ pub(crate) const SURE: f64 = 9.0;
 pub(crate) fn in_front(observations: &Observations, start: &Motion) -> (Motion, f64) {
     let equations = |motion: &Motion| front_equations(observations, motion, &tangents(&motion.u()));
     let (mut motion, mut damping) = (*start, 1e-4);
-    let mut here: FrontEquations = equations(&motion);
+    let mut here = equations(&motion);
     for _ in 0..STEPS {
-        let mut h = here.h;
+        let (mut h, gradient, cost) = here;
         // The last term keeps undetermined directions where they are.
         let floor = 1e-12 * h.trace();
         for i in 0..5 {
             h[(i, i)] += damping * h[(i, i)] + floor;
         }
-        let Some(step) = h.cholesky().map(|factor| factor.solve(&here.gradient)) else { break };
+        let Some(step) = h.cholesky().map(|factor| factor.solve(&gradient)) else { break };
         if !step.iter().all(|value| value.is_finite()) {
             break;
         }
         let next = motion.stepped(&tangents(&motion.u()), &step);
         let there = equations(&next);
-        if there.cost <= here.cost {
+        if there.2 <= cost {
             (motion, here) = (next, there);
             damping *= 0.1;
         } else {
@@ -254,7 +254,7 @@ pub(crate) fn in_front(observations: &Observations, start: &Motion) -> (Motion, 
             break;
         }
     }
-    (motion, here.cost)
+    (motion, here.2)
 }
 
 /// The opposite of a motion, with the rotation that suits it best and how much less likely it is, in squared

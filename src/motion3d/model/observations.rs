@@ -1,11 +1,12 @@
 //! What was measured, whitened once: two rows of `G`, `R` and `f` for every usable point, as planes.
 
 use super::derotation::Derotation;
-use super::rows::Rows;
+use super::rows::{Matrix5, Rows, Vector5};
 use crate::math::{median, quantile};
 use crate::simd::Level;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, SymmetricEigen, Vector2, Vector3};
 use rayon::prelude::*;
+use std::ops::AddAssign;
 
 /// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A
 /// multiple of every lane count.
@@ -243,6 +244,7 @@ impl Observations {
     }
 
     /// Point `k`.
+    #[inline]
     pub fn row(&self, k: usize) -> Row {
         let at = |p: usize| self.planes[p * self.stride + k];
         Row {
@@ -287,6 +289,14 @@ impl KnownRotation {
         let off = self.rotation - w;
         let pull = self.information * off;
         (pull, off.dot(&pull))
+    }
+
+    /// Adds what is known to the sums of a step at the rotation `w`.
+    pub fn add(&self, w: &Vector3<f64>, h: &mut Matrix5, gradient: &mut Vector5, cost: &mut f64) {
+        let (pull, square) = self.pull(w);
+        h.fixed_view_mut::<3, 3>(2, 2).add_assign(self.information);
+        gradient.fixed_rows_mut::<3>(2).add_assign(pull);
+        *cost += square;
     }
 }
 

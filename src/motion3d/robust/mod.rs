@@ -30,7 +30,7 @@ mod two_motion_fit;
 
 use crate::ablation::keeps;
 use crate::math::random::CounterRng;
-use crate::motion3d::kernels::{consensus as truncated, depths};
+use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Scaled};
 use crate::motion3d::model::whitening::Whitening;
@@ -314,6 +314,16 @@ fn searched(observations: &Observations, rng: CounterRng) -> Option<Candidates> 
 fn cheaper_sign(observations: &Observations, motion: Motion) -> (Motion, f64) {
     let signs = [motion, motion.reversed()].map(|motion| (motion, truncated(observations, &motion, INLIER)));
     if signs[1].1 < signs[0].1 { signs[1] } else { signs[0] }
+}
+
+/// `sum min(e^2 + [nu^ < 0] min((nu^ / sd)^2, cut^2 / 2), cut^2)`: an outlier counts once.
+///
+/// One on its epipolar line with a depth behind the camera counts half: what moves along with the camera, or
+/// overtakes it, lies on the same lines, unlike an outlier.
+fn truncated(observations: &Observations, motion: &Motion, cut: f64) -> f64 {
+    let (seen, most) = (depths(observations, motion), cut * cut);
+    let behind = |k: usize| (seen.nu[k].min(0.0).powi(2) * seen.s2[k]).min(0.5 * most);
+    (0..observations.n).map(|k| (seen.e[k].powi(2) + behind(k)).min(most)).sum()
 }
 
 /// Points within three standard deviations of their epipolar line and of the half space before the camera.
