@@ -1,5 +1,4 @@
-"""Parts of the gradient tracker beside their specification: masks, gain of one step, refined flow, gate in
-noise."""
+"""Parts of the gradient tracker beside their specification: masks, gain of one step, gate in noise."""
 
 from __future__ import annotations
 
@@ -19,8 +18,6 @@ STEPS = (0.25, 0.5, 1.0)
 """Shifts along x, px; along y it is half of them the other way."""
 GAINS = {4: (0.259, 0.521, 1.074), 2: (0.328, 0.660, 1.348)}
 """Published mean of u after one step, by order, for the shifts above, px."""
-REFINED = {0.25: 0.002, 0.5: 0.004, 1.0: 0.007, 2.0: 0.02}
-"""Published error of the refined flow by shift, px."""
 WINDOW = 5
 UNGATED = {"min_sigma": 0.0, "cond_max": 1e9, "step_max": 1e9}
 """Published figures are over all pixels."""
@@ -36,7 +33,7 @@ def table() -> list[Row]:
         return []
     from jacoflow import reference
 
-    return [*mask_rows(reference), *gain_rows(reference), *refined_rows(reference), *gate_rows(reference)]
+    return [*mask_rows(reference), *gain_rows(reference), *gate_rows(reference)]
 
 
 def reference_masks(order: int) -> tuple[Array, Array, Array]:
@@ -88,25 +85,6 @@ def gain_rows(reference: Any) -> list[Row]:
                     "reached": reached,
                 }
             )
-    return rows
-
-
-def refined_rows(reference: Any) -> list[Row]:
-    """Error of the refined flow."""
-    rows: list[Row] = []
-    for step, asked in REFINED.items():
-        wrong = inner_flow(reference.refine_flow(*shifted_texture(step), window=WINDOW, **UNGATED)) - (
-            step,
-            -step / 2,
-        )
-        reached = float(np.sqrt(np.nanmean(wrong**2)))
-        rows.append(
-            {
-                "what": f"root mean square error, px, of the refined flow for a shift of {step:g} px",
-                "asked": f"<= {asked}",
-                "reached": reached,
-            }
-        )
     return rows
 
 

@@ -17,7 +17,7 @@ from . import _jacoflow
 from ._jacoflow import MissingDependencyError
 from .track import Array, GradientTracker, Track, TrackResult, _follow, _frame, _numbers, _real, _whole, _word
 
-__all__ = ["MeanFlow", "PixelFlow", "ReferenceResult", "ReferenceTracker", "derivative_kernels", "local_flow", "mean_flow", "refine_flow", "track"]
+__all__ = ["MeanFlow", "PixelFlow", "ReferenceResult", "ReferenceTracker", "derivative_kernels", "local_flow", "mean_flow", "track"]
 
 
 def _compiled(name: str) -> Callable[..., Any]:
@@ -132,24 +132,12 @@ def local_flow(
 ) -> PixelFlow:
     """Flow of single pixels from a frame (H, W) to the next, one step from rest: M. Chiba and S. Ozawa, equations (1) to (8).
 
-    `.flow` (H, W, 2) is in px/frame, `.valid` (H, W) tells where it is accepted: condition number of the gradients in the window (side `window` px) up to `cond_max`, weakest gradient at least `min_sigma` grey
+    `.flow` (H, W, 2) is in px/frame, `.valid` (H, W) is where it is accepted: condition number of the gradients in the window (side `window` px) up to `cond_max`, weakest gradient at least `min_sigma` grey
     levels/px (and 0.7 times the frames' noise, unless it is 0), step up to `step_max` px.
     """
-    return _flow_of_pixels(first, second, False, window=window, order=order, cond_max=cond_max, min_sigma=min_sigma, step_max=step_max)
-
-
-def refine_flow(
-    first: ArrayLike, second: ArrayLike, *, window: int = 7, order: int = 4, cond_max: float = 10.0, min_sigma: float = 2.5, step_max: float = 4.0
-) -> PixelFlow:
-    """As `local_flow`, refined by warping (9)(10) from pictures smoothed over 9 and 5 px to the frames (H, W) themselves; motions up to about 3 px."""
-    return _flow_of_pixels(first, second, True, window=window, order=order, cond_max=cond_max, min_sigma=min_sigma, step_max=step_max)
-
-
-def _flow_of_pixels(first: ArrayLike, second: ArrayLike, refined: bool, *, window: int, order: int, **limits: float) -> PixelFlow:
-    """Flow from a frame (H, W) to the next, px/frame; each option is checked by its name."""
     sizes = _whole("window", window), _whole("order", order)
-    numbers = (_real(name, value) for name, value in limits.items())
-    return PixelFlow(*_compiled("_local_flow")(_frame(first), _frame(second), refined, *sizes, *numbers))
+    limits = _real("cond_max", cond_max), _real("min_sigma", min_sigma), _real("step_max", step_max)
+    return PixelFlow(*_compiled("_local_flow")(_frame(first), _frame(second), *sizes, *limits))
 
 
 @dataclass(frozen=True, eq=False)

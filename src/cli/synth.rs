@@ -290,15 +290,3 @@ fn parse_setting(text: &str) -> std::result::Result<(String, f64), String> {
     let value = value.trim().parse::<f64>().map_err(|_| "expected a number behind the =".to_string())?;
     Ok((name.trim().to_string(), value))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn settings_are_a_name_and_a_number() {
-        assert_eq!(parse_setting("rpm=45"), Ok(("rpm".into(), 45.0)));
-        assert!(parse_setting("rpm").is_err() && parse_setting("rpm=fast").is_err());
-        assert_eq!(parse_point("-80,60"), Ok((-80.0, 60.0)));
-    }
-}

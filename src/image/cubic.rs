@@ -7,7 +7,7 @@ use crate::types::Frame;
 
 /// Brightness at `(x, y)` px by cubic convolution (R. Keys, 1981); places beyond the border count as on it.
 #[inline(always)]
-pub(crate) fn cubic_at<T: Real>(frame: &Frame<T>, x: f64, y: f64) -> T {
+pub fn cubic_at<T: Real>(frame: &Frame<T>, x: f64, y: f64) -> T {
     let (width, height) = frame.size();
     let (x, y) = (x.clamp(0.0, width as f64 - 1.0), y.clamp(0.0, height as f64 - 1.0));
     let (x0, y0) = (x as usize, y as usize);
@@ -25,7 +25,7 @@ pub(crate) fn cubic_at<T: Real>(frame: &Frame<T>, x: f64, y: f64) -> T {
 /// As [`cubic_at`] for every place `(x[i] - origin[0], y[i] - origin[1])`, to `out[i]`.
 ///
 /// Panics when `x` or `y` are shorter than `out`, or when the frame is empty.
-pub(crate) fn cubic_at_all<T: SimdReal>(
+pub fn cubic_at_all<T: SimdReal>(
     level: Level,
     frame: &Frame<T>,
     origin: [f64; 2],
@@ -106,43 +106,4 @@ fn weights<V: Lanes>(f: V) -> [V; 4] {
         f.mul_add(number(-1.5), number(2.0)).mul_add(f, number(0.5)) * f,
         f.mul_add(number(0.5), number(-0.5)) * f2,
     ]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::math::random::CounterRng;
-
-    #[test]
-    fn many_places_are_read_like_single_ones() {
-        let rng = CounterRng::new(5);
-        for (width, height) in [(31, 23), (4, 9), (3, 2), (1, 1)] {
-            let frame = Frame::from_fn(width, height, |x, y| 100.0 + 30.0 * rng.normal((y * width + x) as u64));
-            let origin = [7.0, 3.0];
-            let at = |from: f64, length: usize, k: u64| from - 2.0 + rng.uniform(k) * (length as f64 + 4.0);
-            let mut x: Vec<f64> = (0..203).map(|k| at(origin[0], width, 1000 + k)).collect();
-            let mut y: Vec<f64> = (0..203).map(|k| at(origin[1], height, 5000 + k)).collect();
-            // Places on pixels and on the outermost ones that have all neighbours.
-            x.extend([8.0, 7.0 + width as f64 - 2.0, 7.0]);
-            y.extend([4.0, 3.0 + height as f64 - 2.0, 3.0]);
-            let want: Vec<f64> =
-                x.iter().zip(&y).map(|(x, y)| cubic_at(&frame, x - origin[0], y - origin[1])).collect();
-            for level in Level::available() {
-                let mut got = vec![f64::NAN; x.len()];
-                cubic_at_all(level, &frame, origin, (&x, &y), &mut got);
-                for (g, w) in got.iter().zip(&want) {
-                    assert!((g - w).abs() < 1e-9, "{level:?} {width} x {height}: {g} {w}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn inside_it_is_the_interpolation_of_that_name() {
-        let frame = Frame::from_fn(9, 8, |x, y| ((x * x) as f64).sin() + 0.3 * (x * y) as f64);
-        for (x, y) in [(3.25, 4.75), (1.0, 1.5), (6.9, 5.9)] {
-            assert!((cubic_at(&frame, x, y) - Interpolation::Bicubic.at(&frame, x, y)).abs() < 1e-12);
-        }
-        assert_eq!(cubic_at(&frame, -5.0, 90.0), frame.get(0, 7));
-    }
 }

@@ -10,12 +10,12 @@ use crate::types::{Frame, Mask};
 const RADIUS: usize = 3;
 
 /// `(width, height)` of a halved frame: pixel `i` of the result lies at pixel `2 i`.
-pub(crate) fn halved_size((width, height): (usize, usize)) -> (usize, usize) {
+pub fn halved_size((width, height): (usize, usize)) -> (usize, usize) {
     (width.div_ceil(2), height.div_ceil(2))
 }
 
 /// What halving leaves of the variance of white noise.
-pub(crate) fn halved_noise() -> f64 {
+pub fn halved_noise() -> f64 {
     taps().iter().map(|w| w * w).sum::<f64>().powi(2)
 }
 
@@ -30,14 +30,14 @@ fn taps() -> Vec<f64> {
 /// weights.
 ///
 /// Each result is a direct sum: a NaN damages only the pixels whose kernel reaches it.
-pub(crate) fn halve<T: SimdReal>(level: Level, frame: &Frame<T>) -> Frame<T> {
+pub fn halve<T: SimdReal>(level: Level, frame: &Frame<T>) -> Frame<T> {
     let mut out = Frame::default();
     halve_into(level, frame, &mut out);
     out
 }
 
 /// As [`halve`], into a frame that is made anew only when it is of another size.
-pub(crate) fn halve_into<T: SimdReal>(level: Level, frame: &Frame<T>, out: &mut Frame<T>) {
+pub fn halve_into<T: SimdReal>(level: Level, frame: &Frame<T>, out: &mut Frame<T>) {
     let (width, height) = halved_size(frame.size());
     if out.size() != (width, height) {
         *out = Frame::filled(width, height, T::from_f64(0.0));
@@ -139,7 +139,7 @@ fn sum_along<V: Lanes, const N: usize>(even: &[V::Scalar], odd: &[V::Scalar], x:
 
 /// The mask that belongs to a halved frame: a pixel may be used when at least half of the pixels around `(2
 /// x, 2 y)` may, weighted 1-2-1 along both axes, the border replicated.
-pub(crate) fn halve_mask(mask: &Mask) -> Mask {
+pub fn halve_mask(mask: &Mask) -> Mask {
     let (width, height) = mask.size();
     let (out_width, out_height) = halved_size((width, height));
     let mut out = Frame::filled(out_width, out_height, false);
@@ -165,6 +165,3 @@ pub(crate) fn halve_mask(mask: &Mask) -> Mask {
     });
     out
 }
-
-#[cfg(test)]
-mod tests;

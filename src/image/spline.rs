@@ -16,7 +16,7 @@ const MARGIN: usize = BEFORE + 2;
 /// `f(x, y) = sum_j sum_i c_ij b(x - i) b(y - j)` with the cubic B-spline `b`; the coefficients `c` are such
 /// that `f` meets every sample. Samples must be finite: any other spreads along its column and row.
 #[derive(Debug, Clone)]
-pub(crate) struct Spline<T> {
+pub struct Spline<T> {
     width: usize,
     height: usize,
     /// Values a row.
@@ -34,15 +34,14 @@ impl<T> Default for Spline<T> {
 
 impl<T: SimdReal> Spline<T> {
     /// The spline through the samples of `frame`; identical for any number of threads.
-    #[cfg(test)]
-    pub(crate) fn new(level: Level, frame: &Frame<T>) -> Self {
+    pub fn new(level: Level, frame: &Frame<T>) -> Self {
         let mut spline = Self::default();
         spline.refill(level, frame);
         spline
     }
 
     /// The spline through the samples of another frame, in the same memory when it is of the same size.
-    pub(crate) fn refill(&mut self, level: Level, frame: &Frame<T>) {
+    pub fn refill(&mut self, level: Level, frame: &Frame<T>) {
         let (width, height) = frame.size();
         if (width, height) != self.size() {
             (self.width, self.height) = (width, height);
@@ -55,7 +54,7 @@ impl<T: SimdReal> Spline<T> {
     }
 
     /// `(width, height)` of the frame.
-    pub(crate) fn size(&self) -> (usize, usize) {
+    pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
 
@@ -63,7 +62,7 @@ impl<T: SimdReal> Spline<T> {
     /// first pixel's. All NaN for an empty frame.
     ///
     /// Panics when `x` or `y` are shorter than `out`.
-    pub(crate) fn sample_row(&self, level: Level, x: &[T], y: &[T], out: &mut [T]) {
+    pub fn sample_row(&self, level: Level, x: &[T], y: &[T], out: &mut [T]) {
         dispatch(level, SampleRow { spline: self, x, y, out });
     }
 
@@ -147,6 +146,3 @@ impl<T: SimdReal> Kernel<T> for SampleRow<'_, T> {
         self.spline.sample_row_in::<V>(self.x, self.y, self.out);
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -2,9 +2,12 @@
 
 /// `(xx, xy; xy, yy)`, the normal matrix of a translation (B. Lucas and T. Kanade, 1981).
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct StructureTensor {
+pub struct StructureTensor {
+    /// Of the derivatives along x, squared.
     pub xx: f64,
+    /// Of both derivatives.
     pub xy: f64,
+    /// Of the derivatives along y, squared.
     pub yy: f64,
 }
 
@@ -32,23 +35,5 @@ impl StructureTensor {
     pub fn solve(self, [x, y]: [f64; 2]) -> [f64; 2] {
         let determinant = self.determinant();
         [(self.yy * x - self.xy * y) / determinant, (self.xx * y - self.xy * x) / determinant]
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn eigenvalues_and_steps_are_those_of_the_matrix() {
-        let tensor = StructureTensor { xx: 3.0, xy: -1.2, yy: 0.9 };
-        let matrix = nalgebra::Matrix2::new(3.0, -1.2, -1.2, 0.9);
-        let eigenvalues: nalgebra::Vector2<f64> = matrix.symmetric_eigenvalues();
-        assert!((tensor.smaller_eigenvalue() - eigenvalues.min()).abs() < 1e-14);
-        assert!((tensor.larger_eigenvalue() - eigenvalues.max()).abs() < 1e-14);
-        let step = tensor.solve([0.7, -2.0]);
-        let right = matrix * nalgebra::Vector2::from(step);
-        assert!((right[0] - 0.7).abs() < 1e-14 && (right[1] + 2.0).abs() < 1e-14);
-        assert!(!StructureTensor { xx: 1.0, xy: 1.0, yy: 1.0 }.solve([1.0, 0.0])[0].is_finite());
     }
 }

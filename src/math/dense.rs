@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 
 /// `out = a b` with `a` of `rows x inner` and `b` of `inner x columns`.
-pub(crate) fn multiply(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
+pub fn multiply(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
     let columns = b.len() / inner;
     for (a, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
         out.fill(0.0);
@@ -16,7 +16,7 @@ pub(crate) fn multiply(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
 }
 
 /// `out = a b^T` with `a` of `rows x inner` and `b` of `columns x inner`.
-pub(crate) fn multiply_transposed(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
+pub fn multiply_transposed(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) {
     let columns = b.len() / inner;
     for (a, out) in a.chunks_exact(inner).zip(out.chunks_exact_mut(columns)) {
         for (out, b) in out.iter_mut().zip(b.chunks_exact(inner)) {
@@ -26,7 +26,7 @@ pub(crate) fn multiply_transposed(a: &[f64], b: &[f64], inner: usize, out: &mut 
 }
 
 /// Replaces a square matrix by its symmetric part.
-pub(crate) fn symmetrise(a: &mut [f64], n: usize) {
+pub fn symmetrise(a: &mut [f64], n: usize) {
     for i in 0..n {
         for j in 0..i {
             let mean = 0.5 * (a[i * n + j] + a[j * n + i]);
@@ -37,7 +37,7 @@ pub(crate) fn symmetrise(a: &mut [f64], n: usize) {
 }
 
 /// The lower Cholesky factor of `a` (only its lower triangle is read); false where a pivot is not positive.
-pub(crate) fn cholesky(a: &[f64], n: usize, l: &mut [f64]) -> bool {
+pub fn cholesky(a: &[f64], n: usize, l: &mut [f64]) -> bool {
     l.fill(0.0);
     for j in 0..n {
         let row: f64 = l[j * n..j * n + j].iter().map(|v| v * v).sum();
@@ -58,7 +58,7 @@ pub(crate) fn cholesky(a: &[f64], n: usize, l: &mut [f64]) -> bool {
 /// The Cholesky factor of `a`, which is first mended if it must be: symmetrised, and its eigenvalues lifted
 /// to 1e-12 of the largest. Returns whether it was mended; `None` when it cannot be (NaN, infinity, no
 /// positive eigenvalue).
-pub(crate) fn factor(a: &mut [f64], n: usize, l: &mut [f64]) -> Option<bool> {
+pub fn factor(a: &mut [f64], n: usize, l: &mut [f64]) -> Option<bool> {
     if cholesky(a, n, l) {
         return Some(false);
     }
@@ -89,7 +89,7 @@ const ROUNDING: f64 = 1e-9;
 
 /// What is wrong with a covariance, in words: entries that are not finite, no symmetry, or an eigenvalue
 /// below zero by more than rounding. `None`: nothing.
-pub(crate) fn covariance_fault(a: &[f64], n: usize) -> Option<String> {
+pub fn covariance_fault(a: &[f64], n: usize) -> Option<String> {
     if let Some(value) = a.iter().find(|v| !v.is_finite()) {
         return Some(format!("one with the entry {value}"));
     }
@@ -108,7 +108,7 @@ pub(crate) fn covariance_fault(a: &[f64], n: usize) -> Option<String> {
 
 /// Gives a covariance that lost its eigenvalues' sign in a step one that has it. `Some(true)`: it was mended;
 /// `None`: nothing can be done.
-pub(crate) fn mend(a: &mut [f64], n: usize) -> Option<bool> {
+pub fn mend(a: &mut [f64], n: usize) -> Option<bool> {
     if a.iter().any(|v| !v.is_finite()) {
         return None;
     }
@@ -134,7 +134,7 @@ fn negative_eigenvalue(a: &[f64], n: usize) -> Option<f64> {
 }
 
 /// Solves `l l^T x = b` in place.
-pub(crate) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
+pub fn solve(l: &[f64], n: usize, b: &mut [f64]) {
     forward(l, n, b);
     for i in (0..n).rev() {
         let dot: f64 = (i + 1..n).map(|k| l[k * n + i] * b[k]).sum();
@@ -143,50 +143,9 @@ pub(crate) fn solve(l: &[f64], n: usize, b: &mut [f64]) {
 }
 
 /// Solves `l x = b` in place.
-pub(crate) fn forward(l: &[f64], n: usize, b: &mut [f64]) {
+pub fn forward(l: &[f64], n: usize, b: &mut [f64]) {
     for i in 0..n {
         let dot: f64 = (0..i).map(|k| l[i * n + k] * b[k]).sum();
         b[i] = (b[i] - dot) / l[i * n + i];
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn factor_solves_and_mends() {
-        let mut a = vec![4.0, 2.0, 2.0, 3.0];
-        let mut l = vec![0.0; 4];
-        assert_eq!(factor(&mut a, 2, &mut l), Some(false));
-        let mut b = vec![8.0, 7.0];
-        solve(&l, 2, &mut b);
-        assert!((b[0] - 1.25).abs() < 1e-15 && (b[1] - 1.5).abs() < 1e-15);
-        let mut indefinite = vec![1.0, 2.0, 2.0, 1.0];
-        assert_eq!(factor(&mut indefinite, 2, &mut l), Some(true));
-        assert!((indefinite[0] - 1.5).abs() < 1e-9, "the negative eigenvalue -1 became nearly 0");
-        assert_eq!(factor(&mut [f64::NAN], 1, &mut [0.0]), None);
-    }
-
-    #[test]
-    fn faults_are_told_and_rounding_is_none() {
-        for good in [[0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0], [1.0, 1.0 + 1e-12, 1.0, 1.0], [4.0, 1.0, 1.0, 1e9]] {
-            assert_eq!(covariance_fault(&good, 2), None, "{good:?}");
-            assert_eq!(mend(&mut good.clone(), 2), Some(false), "{good:?}");
-        }
-        for (bad, word) in [
-            ([1.0, 2.0, 2.0, 1.0], "eigenvalue -1"),
-            ([1.0, 5.0, 0.0, 1.0], "5 at (0, 1)"),
-            ([-1.0, 0.0, 0.0, 1.0], "eigenvalue -1"),
-            ([1.0, 0.0, 0.0, f64::INFINITY], "inf"),
-            ([1.0, f64::NAN, f64::NAN, 1.0], "NaN"),
-        ] {
-            let fault = covariance_fault(&bad, 2).unwrap();
-            assert!(fault.contains(word), "{fault}");
-        }
-        let mut lost = [1.0, 2.0, 2.0, 1.0];
-        assert_eq!(mend(&mut lost, 2), Some(true));
-        assert_eq!(covariance_fault(&lost, 2), None);
-        assert_eq!(mend(&mut [f64::NAN; 4], 2), None);
     }
 }

@@ -1,6 +1,6 @@
 //! Small numerical parts that know nothing of images.
 
-pub(crate) mod dense;
+pub mod dense;
 pub mod random;
 mod real;
 pub mod special;
@@ -8,7 +8,7 @@ mod statistics;
 mod ziggurat;
 
 pub use real::Real;
-pub(crate) use statistics::{
+pub use statistics::{
     MAD_TO_STD, RARE_STDS, by_chance, central_median, chi2_deviation, geman_mcclure, median, nearest_quantile,
     quantile, robust_std,
 };

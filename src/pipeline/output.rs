@@ -257,7 +257,7 @@ impl OutputPlan {
     }
 
     /// The file of the field of frame `index` in `format`.
-    pub(super) fn field_path(&self, index: usize, format: FieldFormat) -> Option<PathBuf> {
+    pub fn field_path(&self, index: usize, format: FieldFormat) -> Option<PathBuf> {
         match &self.place {
             Place::Nowhere => None,
             Place::Folder(folder) => Some(folder.join(format!("{index:06}.{}", format.extension()))),
@@ -266,7 +266,7 @@ impl OutputPlan {
     }
 
     /// The file of a picture of the field of frame `index`.
-    pub(super) fn picture_path(&self, index: usize, kind: PictureKind) -> Option<PathBuf> {
+    pub fn picture_path(&self, index: usize, kind: PictureKind) -> Option<PathBuf> {
         match &self.place {
             Place::Nowhere => None,
             Place::Folder(folder) => Some(picture_beside(&folder.join(format!("{index:06}")), kind)),
@@ -331,6 +331,3 @@ pub fn check_target(path: &Path, replace: bool) -> Result<()> {
 pub(super) fn check_writable(folder: &Path) -> Result<()> {
     tempfile::tempfile_in(folder).map(drop).map_err(|source| Error::io(folder, source))
 }
-
-#[cfg(test)]
-mod tests;

@@ -7,8 +7,7 @@ use super::track::{PyGradientTracker, begin, camera_of, pair, word};
 use crate::error::{Error, Result};
 use crate::track::GradientTracker;
 use crate::track::gradient::reference::{
-    Control, LocalFlow, LocalFlowOptions, MeanFlow, Method, ReferenceOptions, RefineOptions, derivative_kernels,
-    local_flow, refine_flow,
+    Control, LocalFlow, LocalFlowOptions, MeanFlow, Method, ReferenceOptions, derivative_kernels, local_flow,
 };
 use crate::types::Frame;
 use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
@@ -91,13 +90,12 @@ pub fn kernels(py: Python<'_>, order: Integer) -> PyResult<Vec<Bound<'_, PyAny>>
         .collect()
 }
 
-/// Flow (H, W, 2) and where it is accepted, of `jacoflow.reference.local_flow` and `refine_flow`.
+/// Flow (H, W, 2) and where it is accepted, of `jacoflow.reference.local_flow`.
 #[pyfunction(name = "_local_flow")]
-#[pyo3(signature = (first, second, refine, window, order, cond_max, min_sigma, step_max))]
+#[pyo3(signature = (first, second, window, order, cond_max, min_sigma, step_max))]
 pub fn flow<'py>(
     first: &Bound<'py, PyAny>,
     second: &Bound<'py, PyAny>,
-    refine: bool,
     window: Integer,
     order: Integer,
     cond_max: f64,
@@ -109,13 +107,7 @@ pub fn flow<'py>(
     let options = LocalFlowOptions { window, order, cond_max, min_sigma, step_max };
     check(&options)?;
     let (first, second) = pair(first, second)?;
-    let LocalFlow { flow, accepted } = py.detach(|| {
-        if refine {
-            refine_flow(&first, &second, &RefineOptions { local: options, ..RefineOptions::default() })
-        } else {
-            local_flow(&first, &second, &options)
-        }
-    });
+    let LocalFlow { flow, accepted } = py.detach(|| local_flow(&first, &second, &options));
     let (width, height) = flow.size();
     let values = flow.data().iter().flatten().copied().collect();
     let flow = arrays::owned::<f64>(py, &[height, width, 2], values)?.into_any();

@@ -272,9 +272,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn no_edges_are_no_sums() {
-        assert!(sweep(&strewn(20, 20, 0.0), &[], CHUNK, From::Above).is_empty());
-    }
 }

@@ -272,11 +272,4 @@ mod tests {
             assert_eq!(out, matches, "{level:?}");
         }
     }
-
-    #[test]
-    fn a_view_without_edges_on_the_right_matches_nothing() {
-        let options = EdgeDisparityOptions::default();
-        let (left, right) = (edges(&view(0, 0)), edges(&Frame::filled(96, 80, 1.0)));
-        assert!(match_classes(&left, &right, &options, (-1, 1), 1).iter().all(Option::is_none));
-    }
 }

@@ -21,7 +21,12 @@ mod derived_region;
 mod derived_region_motion;
 mod derived_sharing;
 mod derived_value;
+mod horn_schunck;
+mod lucas_kanade;
+mod methods;
+mod model;
 mod observability;
+mod points;
 
 const W: f64 = PI / 100.0;
 

@@ -4,11 +4,13 @@ use jacoflow::flow::derived::{Quantity, plane};
 use jacoflow::flow::{Estimator, EstimatorOptions, Method};
 use jacoflow::types::{FlowField, Frame, MOTION_NAMES};
 
+mod dense;
 mod field;
 mod frame;
 mod random;
 mod region;
 mod special;
+mod statistics;
 mod status;
 mod track;
 

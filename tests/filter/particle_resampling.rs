@@ -97,3 +97,32 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn copies_have_the_published_mean_and_variance() {
+    let published = [
+        (Resampling::Multinomial, [0.72, 1.28, 1.68, 1.92]),
+        (Resampling::Stratified, [0.16, 0.40, 0.40, 0.16]),
+        (Resampling::Systematic, [0.16, 0.24, 0.24, 0.16]),
+        // Two draws from the remainders (.8, .6, .4, .2) / 2: variance 2 p (1 - p).
+        (Resampling::Residual, [0.48, 0.42, 0.32, 0.18]),
+    ];
+    const DRAWS: u64 = 20_000;
+    for (scheme, variances) in published {
+        let (mut sums, mut squares, mut out) = ([0.0; 4], [0.0; 4], vec![]);
+        for draw in 0..DRAWS {
+            scheme.indices(&WEIGHTS, 8, &CounterRng::new(3).stream(draw), &mut out);
+            for i in 0..4 {
+                let copies = out.iter().filter(|&&j| j == i).count() as f64;
+                sums[i] += copies;
+                squares[i] += copies * copies;
+            }
+        }
+        for i in 0..4 {
+            let mean = sums[i] / DRAWS as f64;
+            let variance = squares[i] / DRAWS as f64 - mean * mean;
+            assert!((mean - 8.0 * WEIGHTS[i]).abs() < 0.02, "{}: mean {mean} of {i}", scheme.name());
+            assert!((variance - variances[i]).abs() < 0.05, "{}: variance {variance} of {i}", scheme.name());
+        }
+    }
+}

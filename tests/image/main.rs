@@ -2,6 +2,9 @@
 
 mod border;
 mod corners;
+mod cubic;
+mod fill;
+mod gradient;
 mod jet_planes;
 mod jet_stencil;
 mod jet_time;
@@ -15,6 +18,9 @@ mod picture_overlay;
 mod picture_quiver;
 mod picture_wheel;
 mod preprocess;
+mod pyramid;
 mod quantise;
 mod sample;
 mod smooth;
+mod spline;
+mod structure_tensor;

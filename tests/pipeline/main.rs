@@ -1,5 +1,6 @@
 //! From source to sink: frames, pairs and colour frames through estimators and trackers to files.
 
+mod output;
 mod particle;
 mod run;
 mod sink_table;

@@ -305,6 +305,3 @@ fn dot(a: &Flow, b: &Flow) -> f64 {
         .collect();
     parts.iter().sum()
 }
-
-#[cfg(test)]
-mod tests;

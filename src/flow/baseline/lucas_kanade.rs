@@ -296,6 +296,3 @@ fn put<T: Real>(
     }
     band.status[local] = flow.err().unwrap_or(Status::Ok);
 }
-
-#[cfg(test)]
-mod tests;

@@ -111,17 +111,3 @@ impl<T: SimdReal> Planes<T> {
         self.line(k, y)[x]
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lines_are_where_rows_say() {
-        let mut p = Planes::<f32>::new(33, 3, 2);
-        assert_eq!((p.padded(), p.stride(), p.row_len()), (64, 96, 192));
-        p.line_mut(1, 2)[5] = 7.0;
-        assert_eq!((p.at(1, 5, 2), p.row(2)[p.stride() + LEFT + 5]), (7.0, 7.0));
-        assert!(p.line(0, 2).iter().all(|v| *v == 0.0));
-    }
-}

@@ -194,17 +194,6 @@ mod tests {
     }
 
     #[test]
-    fn levels_halve_down_to_the_least_side() {
-        let frame = Frame::<f32>::from_fn(100, 50, |x, y| ((x * y) as f32).sin());
-        let sizes =
-            |max_levels| pyramid(&[&frame, &frame], max_levels).levels().iter().map(|l| l.size).collect::<Vec<_>>();
-        assert_eq!(sizes(None), [(100, 50), (50, 25), (25, 13)]);
-        assert_eq!(sizes(Some(2)), [(100, 50), (50, 25)]);
-        let tiny = Frame::<f32>::filled(3, 3, 1.0);
-        assert_eq!(pyramid(&[&tiny, &tiny], None).levels().len(), 1);
-    }
-
-    #[test]
     fn holes_reach_as_far_as_the_stencils() {
         let mut frame = Frame::<f32>::filled(20, 16, 1.0);
         frame.row_mut(8)[10] = f32::NAN;

@@ -13,8 +13,6 @@ mod follow;
 mod options;
 mod pyramid;
 mod rows;
-#[cfg(test)]
-mod tests;
 mod window;
 
 pub use batch::{PointFlow, track_points};

@@ -80,24 +80,3 @@ pub fn chart_picture(nodes: &[ChartNode], arcs: &[ChartArc]) -> Picture {
     }
     picture
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn node(step: usize, lane: usize, number: u64) -> ChartNode {
-        ChartNode { step, lane, size: 50.0, number }
-    }
-
-    #[test]
-    fn nodes_stand_at_their_steps_and_arcs_between_them() {
-        let nodes = [node(0, 0, 3), node(1, 1, 3), node(1, 0, 4)];
-        let arcs = [ChartArc { from: 0, to: 1, width: 3.0 }, ChartArc { from: 0, to: 9, width: 3.0 }];
-        let picture = chart_picture(&nodes, &arcs);
-        assert_eq!((picture.width(), picture.height()), (116, 108));
-        assert_eq!((picture.pixel(40, 40), picture.pixel(76, 68)), (identity_colour(3), identity_colour(3)));
-        assert_eq!(picture.pixel(76, 40), identity_colour(4));
-        assert_eq!(picture.pixel(58, 54), identity_colour(3), "the arc's middle");
-        assert_eq!(picture.pixel(58, 40), GROUND);
-    }
-}

@@ -27,17 +27,3 @@ fn nearness_colour(nearness: f64) -> Rgb {
     // Red, green and blue stand at 0, 2 and 4 sixths of the circle of hues.
     [0.0, 2.0, 4.0].map(|centre: f64| (255.0 * (2.0 - (hue - centre).abs()).clamp(0.0, 1.0)).round() as u8)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn near_is_red_and_far_is_blue() {
-        let map = Frame::new(4, 1, vec![24.0, -40.0, f32::NAN, -8.0]).unwrap();
-        let mut picture = Picture::filled(4, 1, [100; 3]);
-        draw_disparity(&mut picture, &map, (-40.0, 24.0));
-        assert_eq!([0, 1, 2, 3].map(|x| picture.pixel(x, 0)), [[255, 0, 0], [0, 0, 255], [50; 3], [0, 255, 0]]);
-        assert_eq!((nearness_colour(7.0), nearness_colour(-1.0)), ([255, 0, 0], [0, 0, 255]));
-    }
-}

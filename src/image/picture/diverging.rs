@@ -70,16 +70,3 @@ fn colour(value: f64) -> Rgb {
     let (a, b) = (STOPS[first], STOPS[first + 1]);
     std::array::from_fn(|c| (f64::from(a[c]) * (1.0 - part) + f64::from(b[c]) * part).round() as u8)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn zero_is_white_and_signs_have_their_colours() {
-        let picture = SignedMap::new(Some(2.0)).picture(&[0.0f64, 2.0, -2.0, f64::NAN, 99.0], 5, 1).unwrap();
-        assert_eq!([0, 1, 2, 3].map(|x| picture.pixel(x, 0)), [STOPS[2], STOPS[4], STOPS[0], [110; 3]]);
-        assert_eq!(picture.pixel(4, 0), STOPS[4]);
-        assert_eq!(colour(0.5), STOPS[3]);
-    }
-}

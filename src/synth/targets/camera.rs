@@ -88,31 +88,3 @@ impl Pose {
         [self.zoom * (self.cos * x + self.sin * y), self.zoom * (self.cos * y - self.sin * x)]
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn window_and_world_are_each_other_s_inverse() {
-        let motion = CameraMotion { zoom: (0.85, 1.25), roll: 6.0, ..CameraMotion::HANDHELD };
-        for pose in motion.poses(CounterRng::new(4), 50, 0.5) {
-            for point in [[0.0, 0.0], [-130.0, 77.5], [3.25, -60.0]] {
-                let back = pose.to_window(pose.to_world(point));
-                assert!((back[0] - point[0]).hypot(back[1] - point[1]) < 1e-12);
-            }
-        }
-    }
-
-    #[test]
-    fn the_shake_is_as_strong_as_asked_and_the_zoom_ends_where_it_should() {
-        let motion = CameraMotion { shake: 3.0, zoom: (0.5, 2.0), ..CameraMotion::STATIC };
-        let poses = motion.poses(CounterRng::new(9), 4001, 1.0);
-        for axis in [0, 1] {
-            let square = poses.iter().map(|p| p.centre[axis].powi(2)).sum::<f64>() / 4001.0;
-            assert!((square.sqrt() - 3.0).abs() < 0.05, "{}", square.sqrt());
-        }
-        assert!((poses[0].zoom, poses[2000].zoom, poses[4000].zoom) == (0.5, 1.0, 2.0));
-        assert_eq!(CameraMotion::STATIC.poses(CounterRng::new(1), 1, 1.0)[0].to_world([4.0, -2.0]), [4.0, -2.0]);
-    }
-}

@@ -36,22 +36,3 @@ impl Hsv {
 pub(super) fn blend(from: [f64; 3], to: [f64; 3], share: f64) -> [f64; 3] {
     std::array::from_fn(|c| from[c] + share * (to[c] - from[c]))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn hues_are_where_they_belong() {
-        let sixths = [[1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1], [1, 0, 1]];
-        for (k, want) in sixths.into_iter().enumerate() {
-            let got = Hsv(k as f64 / 6.0, 1.0, 1.0).to_rgb();
-            for (a, b) in got.into_iter().zip(want) {
-                assert!((a - 255.0 * f64::from(b)).abs() < 1e-9, "{k}: {got:?}");
-            }
-        }
-        assert_eq!(Hsv(0.3, 0.0, 0.4).to_rgb(), [102.0; 3]);
-        let [red, green, blue] = SHIRT.to_rgb();
-        assert!(red > 2.5 * green && red > 2.5 * blue);
-    }
-}

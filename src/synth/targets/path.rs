@@ -60,36 +60,3 @@ impl Course {
         (0..frames).map(place).collect()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const THERE_AND_BACK: Course = Course {
-        start: [-10.0, 4.0],
-        size: [1.0, 2.0],
-        velocities: &[(0.0, [2.0, 0.0]), (10.0, [0.0, 0.0]), (20.0, [-2.0, 1.0])],
-    };
-
-    #[test]
-    fn velocities_hold_and_change_gradually() {
-        let places = THERE_AND_BACK.places(41, 0.5);
-        assert_eq!((places[0].position, places[0].walked), ([-5.0, 2.0], 0.0));
-        assert_eq!((places[10].position, places[10].velocity), ([5.0, 2.0], [1.0, 0.0]));
-        assert_eq!(places[13].velocity, [0.5, 0.0]);
-        assert_eq!((places[16].velocity, places[20].velocity), ([0.0; 2], [0.0; 2]));
-        assert_eq!(places[40].velocity, [-1.0, 0.5]);
-        assert_eq!((places[0].size, places[20].size, places[40].size), (1.0, 1.5, 2.0));
-    }
-
-    #[test]
-    fn steps_are_the_velocity_of_the_frame_they_lead_to() {
-        let places = THERE_AND_BACK.places(41, 1.0);
-        for pair in places.windows(2) {
-            for axis in [0, 1] {
-                assert!((pair[1].position[axis] - pair[0].position[axis] - pair[1].velocity[axis]).abs() < 1e-12);
-            }
-            assert!(pair[1].walked >= pair[0].walked);
-        }
-    }
-}

@@ -235,30 +235,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn who_looks_to_the_left_is_the_mirror_image() {
-        let sprite = Sprite::new(Figure::Car, CounterRng::new(3));
-        let stance = Stance { centre: [0.0; 2], size: [76.0, 42.0], phase: 0.0, angle: 0.0, mirrored: false };
-        let (right, left) = (sprite.drawing(stance), sprite.drawing(Stance { mirrored: true, ..stance }));
-        for y in -25..25 {
-            for x in (-40..40).map(|x| f64::from(x) + 0.3) {
-                let (mut a, mut b) = ([9.0; 3], [9.0; 3]);
-                right.draw([x, y as f64], &mut a);
-                left.draw([-x, y as f64], &mut b);
-                assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9), "{a:?} {b:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn the_legs_swing_with_the_phase() {
-        let sprite = Sprite::new(Figure::Person, CounterRng::new(3));
-        let spread = |phase: f64| {
-            let stance = Stance { centre: [0.0; 2], size: [54.0, 132.0], phase, angle: 0.0, mirrored: false };
-            let feet = covered(&sprite, stance).into_iter().filter(|p| p[1] > 50.0).map(|p| p[0].abs());
-            feet.fold(0.0, f64::max)
-        };
-        assert!(spread(std::f64::consts::FRAC_PI_2) > spread(0.0) + 15.0);
-    }
 }

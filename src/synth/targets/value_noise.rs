@@ -73,13 +73,4 @@ mod tests {
             assert!((noise.get(8 + x, 12) - straight).abs() < 1e-12);
         }
     }
-
-    #[test]
-    fn octaves_add_up() {
-        let rng = CounterRng::new(1);
-        let size = (40, 30);
-        let (both, first) = (value_noise(rng, size, &[(7.0, 1.0), (2.5, 0.5)]), value_noise(rng, size, &[(7.0, 1.0)]));
-        let rest = both.data().iter().zip(first.data()).map(|(a, b)| a - b);
-        assert!(rest.clone().all(|v| v.abs() <= 0.5) && rest.map(f64::abs).fold(0.0, f64::max) > 0.3);
-    }
 }

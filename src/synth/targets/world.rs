@@ -82,34 +82,3 @@ fn draw_rectangle(picture: &mut ColourFrame<f64>, rng: CounterRng, k: u64, scale
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_world_is_read_between_pixels_and_ends_nowhere() {
-        let world = World::new(CounterRng::new(5), 0.25);
-        let (width, height) = world.picture.size();
-        assert_eq!((width, height), (325, 225));
-        let (middle_x, middle_y) = (width as f64 / 2.0, height as f64 / 2.0);
-        for (column, row) in [(0, 0), (100, 80), (324, 224)] {
-            assert_eq!(world.colour(column as f64 - middle_x, row as f64 - middle_y), world.picture.get(column, row));
-        }
-        let half = world.colour(20.5 - middle_x, 30.0 - middle_y);
-        let mean = blend(world.picture.get(20, 30), world.picture.get(21, 30), 0.5);
-        assert!(half.iter().zip(mean).all(|(a, b)| (a - b).abs() < 1e-9));
-        assert_eq!(world.colour(1e6, -1e6), world.picture.get(width - 1, 0));
-    }
-
-    #[test]
-    fn the_ground_is_grey_green_and_textured() {
-        let world = World::new(CounterRng::new(2), 0.5);
-        let count = world.picture.data().len() as f64;
-        let mean: [f64; 3] = std::array::from_fn(|c| world.picture.data().iter().map(|p| p[c]).sum::<f64>() / count);
-        let green = world.picture.data().iter().map(|p| (p[1] - mean[1]).powi(2)).sum::<f64>() / count;
-        // Rectangles of random colour move the mean a little.
-        assert!(mean.iter().zip(GROUND).all(|(a, b)| (a - b).abs() < 12.0), "{mean:?}");
-        assert!((12.0..40.0).contains(&green.sqrt()), "{}", green.sqrt());
-    }
-}

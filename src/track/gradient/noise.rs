@@ -1,6 +1,6 @@
-//! Robust statistics of brightness: the median, the scatter about it, and the noise of two frames.
+//! Robust statistics of brightness: the scatter about the median, and the noise of two frames.
 
-use crate::math::robust_std;
+use crate::math::{median, robust_std};
 use crate::types::Frame;
 
 /// Pixels that the noise of two frames is measured on, about.
@@ -17,14 +17,9 @@ pub(super) fn noise_of(first: &Frame<f64>, second: &Frame<f64>, samples: usize) 
 
 /// Standard deviation of values about their median, robustly; 0 of nothing.
 pub(super) fn scatter_of(mut values: Vec<f64>) -> f64 {
-    let middle = median(&mut values);
+    let middle = median(&mut values).unwrap_or(0.0);
     for value in &mut values {
         *value = (*value - middle).abs();
     }
     robust_std(&mut values).unwrap_or(0.0)
-}
-
-/// The middle value (the upper one of two); 0 of nothing.
-pub(super) fn median(values: &mut [f64]) -> f64 {
-    crate::math::median(values).unwrap_or(0.0)
 }

@@ -186,14 +186,6 @@ mod tests {
     }
 
     #[test]
-    fn low_boxes_have_fewer_bands() {
-        let bins = striped();
-        for (height, bands) in [(2.0, 3), (3.5, 3), (5.0, 5), (8.0, 8), (30.0, 8)] {
-            assert_eq!(Appearance::learn(&bins, [29.5, 29.5, 20.0, height], true).bands, bands);
-        }
-    }
-
-    #[test]
     fn common_surroundings_count_less() {
         // Half of the box has the colour of what is around it.
         let bins = Frame::from_fn(60, 60, |x, _| if (20..30).contains(&x) { 3 } else { 7 });
@@ -201,12 +193,5 @@ mod tests {
         let (plain, weighted) = (Appearance::learn(&bins, bounds, false), Appearance::learn(&bins, bounds, true));
         let elsewhere = [50.0, 29.5, 18.0, 48.0];
         assert!(weighted.similarity(&bins, elsewhere) < 0.8 * plain.similarity(&bins, elsewhere));
-    }
-
-    #[test]
-    fn boxes_fade_below_half_visibility() {
-        assert_eq!(visible_share([9.5, 9.5, 20.0, 20.0], (20, 20)), 1.0);
-        assert_eq!(visible_share([-0.5, 9.5, 20.0, 20.0], (20, 20)), 0.5);
-        assert_eq!(visibility_factor([-5.5, 9.5, 20.0, 20.0], (20, 20)), 0.5);
     }
 }

@@ -208,18 +208,4 @@ mod tests {
         assert!((x - 16.0).abs() < 1e-12 && (y - 27.0).abs() < 1e-12 && (u, v) == (3.0, 4.0));
         assert!((w - 8.0 * 0.1f64.exp()).abs() < 1e-12 && h == 360.0);
     }
-
-    #[test]
-    fn weights_without_likelihood_stay() {
-        let mut cloud = cloud(8);
-        let before = cloud.clone();
-        assert!(!cloud.weigh(&[f64::NEG_INFINITY; 8]) && cloud == before);
-        assert!(!cloud.weigh(&[f64::NAN; 8]) && cloud == before);
-        let mut one = [f64::NEG_INFINITY; 8];
-        one[3] = -1e4;
-        assert!(cloud.weigh(&one));
-        assert_eq!((cloud.weights[3], cloud.effective_sample_size()), (1.0, 1.0));
-        cloud.select(Resampling::Systematic, 1.0, 5, stream(0, 0, 0, Purpose::Selection));
-        assert!(cloud.particles.iter().all(|particle| *particle == before.particles[3]) && cloud.weights == [0.2; 5]);
-    }
 }

@@ -250,28 +250,6 @@ mod tests {
     }
 
     #[test]
-    fn the_heaviest_flow_is_background() {
-        let rng = CounterRng::new(4);
-        let flow: Vec<[f64; 2]> = (0..400u64)
-            .map(|k| {
-                let centre = if k % 5 == 0 { [4.0, 0.0] } else { [1.0, -0.5] };
-                [0, 1].map(|i| centre[i] + 0.1 * rng.normal(2 * k + i as u64))
-            })
-            .collect();
-        for foreground in ForegroundModel::ALL {
-            let options = ParticleOptions { foreground, ..ParticleOptions::default() };
-            let found = background_flow(&flow, &options).unwrap();
-            assert!((found.flow[0] - 1.0).abs() < 0.03 && (found.flow[1] + 0.5).abs() < 0.03);
-            let mean = |moving: bool| {
-                let chosen = found.foreground.iter().enumerate().filter(|(k, _)| (k % 5 == 0) == moving);
-                chosen.map(|(_, q)| q).sum::<f64>() / if moving { 80.0 } else { 320.0 }
-            };
-            assert!(mean(true) > 0.98 && mean(false) < 0.6, "{foreground:?} {} {}", mean(true), mean(false));
-        }
-        assert_eq!(background_flow(&flow[..2], &ParticleOptions::default()).unwrap().foreground, [0.0; 2]);
-    }
-
-    #[test]
     fn the_map_is_high_where_corners_move() {
         let track = |k: u64, position: [f64; 2], foreground| Track {
             id: k,

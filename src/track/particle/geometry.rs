@@ -30,18 +30,3 @@ pub(super) fn centred(bounds: TargetBox) -> CentredBox {
     let [x, y] = bounds.centre();
     [x, y, bounds.width, bounds.height]
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn places_and_shares() {
-        let own = [10.0, 10.0, 4.0, 8.0];
-        assert!(holds(own, [11.9, 13.9], 1.0, 0.0) && !holds(own, [12.1, 10.0], 1.0, 0.0));
-        assert!(holds(own, [12.5, 10.0], 1.3, 0.0) && holds(own, [12.5, 10.0], 1.0, 1.0));
-        assert_eq!(covered_share(own, [11.0, 10.0, 4.0, 80.0]), 0.75);
-        assert_eq!(covered_share(own, [20.0, 10.0, 4.0, 8.0]), 0.0);
-        assert_eq!(centred(TargetBox { x: 1.0, y: 2.0, width: 4.0, height: 6.0 }), [3.0, 5.0, 4.0, 6.0]);
-    }
-}

@@ -181,19 +181,6 @@ mod tests {
     }
 
     #[test]
-    fn a_new_look_is_learned_and_a_cover_is_not() {
-        for (labelled, learned) in [(14, true), (13, false)] {
-            let mut presence = settled();
-            for _ in 0..200 {
-                presence.judge(0.5);
-                presence.learn(0.5, labelled, &ESTIMATE);
-            }
-            assert_eq!(presence.is_low, !learned);
-            assert_eq!(presence.clear_place, [10.0, 20.0]);
-        }
-    }
-
-    #[test]
     fn noise_grows_while_hidden() {
         let mut presence = settled();
         presence.judge(0.1);

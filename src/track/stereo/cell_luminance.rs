@@ -145,23 +145,6 @@ mod tests {
     }
 
     #[test]
-    fn of_equal_shifts_the_shortest_is_taken() {
-        let flat = CellLuminance::new(&Frame::filled(160, 120, 90.0), &lattice());
-        assert_eq!(flat.find(&[[10, 7]], &flat, 8).unwrap(), Match { shift: [0, 0], difference: 0.0 });
-    }
-
-    #[test]
-    fn half_of_the_template_must_stay_in_the_picture() {
-        let template: Vec<_> = (0..4).map(|x| [x, 7]).collect();
-        // Moved by two cells, two of four are left; by three, the right place is out of the question.
-        let found = |dx| picture(0, 0).find(&template, &picture(dx, 0), 8).unwrap();
-        assert_eq!(found(-2), Match { shift: [-2, 0], difference: 0.0 });
-        assert_ne!(found(-3).shift, [-3, 0]);
-        let dark = CellLuminance::new(&Frame::filled(160, 120, f32::NAN), &lattice());
-        assert_eq!(picture(0, 0).find(&template, &dark, 8), None);
-    }
-
-    #[test]
     fn levels_are_means_cut_down() {
         let mut frame = Frame::filled(160, 120, 7.9f32);
         frame.row_mut(0)[0] = f32::NAN;

@@ -40,24 +40,3 @@ pub(super) fn cell_motions(from: &ObservedStep, to: &ObservedStep, reach: i32) -
     };
     (0..from.clusters.components()).into_par_iter().map(one).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::clusters::tests::synthetic_clusters;
-    use super::*;
-    use crate::types::Frame;
-
-    #[test]
-    fn a_picture_of_nothing_has_no_motion_either_way() {
-        let cells: Vec<_> = (0..40).map(|i| ([20 + i % 5, 30 + i / 5, 40], 0)).collect();
-        let seen = |clusters: Clusters, level: &dyn Fn(usize, usize) -> f32| {
-            let luminance = CellLuminance::new(&Frame::from_fn(640, 480, level), clusters.lattice());
-            ObservedStep { clusters, luminance, levels: None }
-        };
-        let one = seen(synthetic_clusters(&cells, 1), &|x, y| ((x / 8 * 37 + y / 8 * 11) % 256) as f32);
-        let nothing = seen(synthetic_clusters(&[], 0), &|_, _| 0.0);
-        assert_eq!(cell_motions(&one, &nothing, 8), [None]);
-        assert_eq!(cell_motions(&nothing, &one, 8), []);
-        assert_eq!(cell_motions(&one, &one, 8)[0].as_ref().map(|motion| motion.shift), Some([0, 0, 0]));
-    }
-}

@@ -125,9 +125,4 @@ pub(super) mod tests {
         assert_eq!(renamed.of_point, [0, 1, 1, 1, 1]);
         assert_eq!((&renamed.members[1], &renamed.pixels[1]), (&clusters.members[2], &clusters.pixels[2]));
     }
-
-    #[test]
-    fn what_belongs_to_components_goes_with_their_names() {
-        assert_eq!(reordered(vec!['a', 'b', 'c'], &[2, 0, 1]), ['b', 'c', 'a']);
-    }
 }

@@ -100,22 +100,6 @@ mod tests {
     }
 
     #[test]
-    fn voxels_count_whatever_they_hold() {
-        // Of two voxels one holds nine pixels; each counts as half.
-        let before = synthetic_clusters(&[vec![([10, 10, 30], 0); 9], vec![([11, 10, 30], 0)]].concat(), 1);
-        let after = synthetic_clusters(&[([10, 10, 30], 0), ([11, 10, 30], 1)], 2);
-        assert_eq!(depth_motion(&before, 0, &after, [0, 0], 8).overlaps, [0.5, 0.5]);
-        assert_eq!(moved_overlaps(&before, 0, &after, |i| before.points.at(i)), [0.5, 0.5]);
-    }
-
-    #[test]
-    fn whom_nobody_meets_stays_and_overlaps_nothing() {
-        let before = synthetic_clusters(&block([10, 10, 30], 0), 1);
-        let after = synthetic_clusters(&block([60, 40, 5], 0), 1);
-        assert_eq!(depth_motion(&before, 0, &after, [0, 0], 8), Depth { shift: 0, overlaps: vec![0.0] });
-    }
-
-    #[test]
     fn pixels_moved_by_themselves_meet_the_same() {
         let before = synthetic_clusters(&block([10, 10, 30], 0), 1);
         let after = synthetic_clusters(&block([12, 9, 33], 2), 3);

@@ -192,11 +192,4 @@ mod tests {
         assert_eq!(own_places(&strayed, view), right);
         assert_eq!(own_places(&[], view), [] as [[f64; 2]; 0]);
     }
-
-    #[test]
-    fn where_the_view_says_nothing_all_are_its_own() {
-        let blind = Frame::filled(120, 120, f32::NAN);
-        let all: Vec<_> = (0..40).map(|i| [40.0 + f64::from(i % 8), 40.0 + f64::from(i)]).collect();
-        assert_eq!(own_places(&all, View { plain: &blind, smooth: &blind }), all);
-    }
 }

@@ -71,13 +71,4 @@ mod tests {
         // In a ring.
         assert_eq!(named([[0.0, 0.9, 0.0], [0.0, 0.0, 0.8], [0.7, 0.0, 0.0]]), [2, 0, 1]);
     }
-
-    #[test]
-    fn weak_and_equal_shares_change_nothing() {
-        assert_eq!(named([[0.0, 0.19, 0.0], [0.0, 0.0, 0.0], [0.0; 3]]), [0, 1, 2]);
-        assert_eq!(named([[0.5, 0.5, 0.0], [0.5, 0.5, 0.0], [0.0; 3]]), [0, 1, 2]);
-        // 0 goes into 1, which has been there all along.
-        assert_eq!(named([[0.0, 0.6, 0.0], [0.0, 0.9, 0.0], [0.0; 3]]), [0, 1, 2]);
-        assert_eq!(successors(&[], &[vec![], vec![]], [&[], &[0, 0]], 0.4), [0, 1]);
-    }
 }

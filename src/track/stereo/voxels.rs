@@ -274,27 +274,4 @@ pub(super) mod tests {
         assert_eq!(left_out, 3);
         assert_eq!(points(&[-40.0, 24.0]).within(&lattice()), (points(&[-40.0, 24.0]), 0));
     }
-
-    #[test]
-    fn cells_need_not_be_whole_pixels() {
-        let lattice = Lattice { grid: VoxelGrid { columns: 3, rows: 2, layers: 4, first_disparity: 0 }, size: (10, 5) };
-        assert_eq!(lattice.cell_columns(), [0, 0, 0, 0, 1, 1, 1, 2, 2, 2]);
-        assert_eq!(lattice.cell_rows(), [0, 0, 0, 1, 1]);
-        assert_eq!(lattice.voxel_at([9.4, 4.4, 4.0]), Some([2, 1, 3]));
-        assert_eq!((lattice.voxel_at([9.6, 4.0, 0.0]), lattice.voxel_at([0.0, 0.0, -1.0])), (None, None));
-    }
-
-    #[test]
-    fn coordinates_in_cells_go_back_to_pixels() {
-        let [x, y, d] = lattice().pixels_of([0.0, 59.0, 40.0]);
-        assert_eq!([x, y, d], [3.5, 475.5, 0.0]);
-        assert_eq!(lattice().cells_of([x, y, d]), [0.0, 59.0, 40.0]);
-    }
-
-    #[test]
-    fn only_finite_disparities_are_points() {
-        let map = Frame::new(3, 1, vec![f32::NAN, 2.0, f32::INFINITY]).unwrap();
-        let points = EdgePoints::from_map(&map);
-        assert_eq!((points.len(), points.at(0)), (1, [1.0, 0.0, 2.0]));
-    }
 }

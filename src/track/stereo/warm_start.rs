@@ -192,18 +192,4 @@ pub(super) mod tests {
         lost.means[0] = 30.0;
         assert_eq!(reseed(&mut lost, &voxels, &points).unwrap(), None);
     }
-
-    #[test]
-    fn nobody_is_seeded_into_what_is_explained() {
-        // A flat block with a few voxels beside its layer: near one of them there are enough pixels, but not
-        // of its kind.
-        let block = |z: u16, n: u16| (0..n).map(move |i| ([10 + i % 3, 10 + i / 3 % 3, z], 0));
-        let cells: Vec<_> = block(30, 90).chain(block(31, 9)).collect();
-        let voxels = synthetic_clusters(&cells, 1).voxels;
-        let (values, weights) = (voxels.places(), voxels.weights());
-        let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
-        let mut posterior = posterior();
-        assert_eq!(reseed(&mut posterior, &voxels, &points).unwrap().unwrap().seeds, [false, false]);
-        assert_eq!(posterior.means[3..], [70.0, 50.0, 3.0]);
-    }
 }

@@ -213,23 +213,6 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_seen_goes_on_as_what_is() {
-        let mut data = Planes::<f64>::new(20, 15, SEEN + 1);
-        (1..14).for_each(|y| data.line_mut(SEEN, y)[2..18].fill(1.0));
-        let mut flow = filled(|_, x, y| x + 100.0 * y);
-        data.line_mut(SEEN, 5)[7..10].fill(0.0);
-        continue_beyond(&data, &mut flow);
-        let at = |x: usize, y: usize| flow.at(1, x, y);
-        assert_eq!([at(0, 0), at(19, 14), at(3, 3)], [204.0, 2634.0, 606.0]);
-        // From (6, 5) and (7, 6).
-        assert_eq!(at(7, 5), 0.5 * (1012.0 + 1214.0));
-        let nothing = Planes::<f64>::new(20, 15, SEEN + 1);
-        let before = flow.clone();
-        continue_beyond(&nothing, &mut flow);
-        assert_eq!(flow.data(), before.data());
-    }
-
-    #[test]
     fn the_share_of_steady_flow_is_found_beside_objects_with_their_own_ways() {
         let steady = steady::half_acceleration(&PlanePool::default(), &rotation(0.03));
         let seen = |share: f64| {

@@ -162,14 +162,6 @@ mod tests {
     }
 
     #[test]
-    fn slow_rotation_accelerates_towards_its_centre() {
-        let w = 0.03;
-        let got = half_acceleration(&PlanePool::default(), &rotation(w));
-        let want = filled(|k, x, y| -0.5 * w * w * [x - 20.0, y - 15.0, 1.0, 0.0, 0.0, 1.0][k]);
-        assert!(difference(&got, &want) < 1e-15);
-    }
-
-    #[test]
     fn fast_rotation_goes_on_in_its_circle() {
         // Rotating by `w` a frame, a particle's earlier and later positions meet nearer to the centre by cos
         // w, and the mean step is sin w.

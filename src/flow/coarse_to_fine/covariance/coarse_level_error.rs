@@ -197,34 +197,6 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_inherited_where_data_lead_or_nothing_is_seen_or_there_is_one_level() {
-        let none = |constrained: ConstrainedDirections, nodes: usize, coarser: &[Planes<f64>]| {
-            let errors = CoarseLevelErrors::new(&constant(33, 1.0, 0.0), coarser, constrained);
-            errors.at_nodes((nodes, nodes)).iter().all(|found| found.variances == [0.0; 2])
-        };
-        let coarser = [constant(17, 0.7, 0.1)];
-        let (constrained, nodes) = but_for(33, 0..0);
-        assert!(none(constrained, nodes, &coarser));
-        let (constrained, nodes) = but_for(33, 8..25);
-        assert!(!none(constrained, nodes, &coarser));
-        assert!(none(but_for(33, 8..25).0, nodes, &[]));
-        assert!(none(but_for(33, 0..33).0, nodes, &coarser), "no site is_reference how exact the level is");
-        let hidden: Vec<UnconstrainedDirections> = (0..33 * 33).map(|n| if n % 33 < 8 { NONE } else { ALL }).collect();
-        assert!(none(
-            ConstrainedDirections::with((33, &hidden), (nodes, nodes), |n| hidden[n] == NONE),
-            nodes,
-            &coarser
-        ));
-    }
-
-    #[test]
-    fn slopes_err_by_the_rise_of_the_flow() {
-        let values = [0.0, 0.0, 0.8, 0.8, 0.0, 0.0, 0.8, 2.4];
-        let rises = [(0, 0.0), (1, 0.005), (2, 0.005), (3, 0.02), (6, 0.025)];
-        assert!(rises.iter().all(|&(n, rise)| (squared_rise(&values, (4, 2), n) - rise).abs() < 1e-12));
-    }
-
-    #[test]
     fn only_directions_without_texture_inherit() {
         let side = 97usize;
         let (slanted, coarser) = ([0.5, 0.5, 0.5], [constant(49, 0.5 * 1.1, 0.01)]);

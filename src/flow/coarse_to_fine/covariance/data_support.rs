@@ -153,13 +153,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn runs_are_counted_from_their_ends() {
-        let row = |s: &str| s.bytes().map(|b| b == b'x').collect::<Vec<_>>();
-        assert_eq!(signed(&row("..xxxx.")), [-2.0, -1.0, 0.0, 1.0, 1.0, 0.0, -1.0]);
-        assert_eq!(signed(&row("xx...x")), [0.0, 0.0, -1.0, -2.0, -1.0, 0.0]);
-    }
-
-    #[test]
     fn strips_and_corners_are_continued_from_the_seen_rectangle_and_holes_from_the_nearer_side() {
         let (width, height) = (41, 33);
         let mut data = Planes::<f64>::new(width, height, SEEN + 1);

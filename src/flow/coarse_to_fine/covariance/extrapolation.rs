@@ -101,21 +101,3 @@ impl Extrapolation {
         below
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn curved_motion_differs_by_its_curvature_and_less_so_nearer() {
-        let from = |variance: f64| [variance, 0.1 * variance];
-        let e = Extrapolation { variances: [1.0, 4.0, 9.0, 16.0].map(from) };
-        assert_eq!(e.variance(0, 0.0), 0.0);
-        assert_eq!((e.variance(0, 4.0), e.variance(1, 8.0), e.variance(0, 1e4)), (0.25, 0.1, 16.0));
-        let mut node = [0.0; crate::flow::symmetric::ENTRIES];
-        e.add(&mut node, [f64::INFINITY, 100.0], [3.0, 4.0]);
-        assert!(node.iter().all(|entry| *entry < 1e-30));
-        e.add(&mut node, [-20.0, 100.0], [3.0, 4.0]);
-        assert!(node[upper(0, 0)] > 4.0 && node[upper(5, 5)] > 0.4 && node[upper(0, 1)] == 0.0);
-    }
-}

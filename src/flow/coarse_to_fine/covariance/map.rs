@@ -96,29 +96,3 @@ impl<T: SimdReal> CovarianceMap<T> {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rows_are_what_single_pixels_are() {
-        let nodes: Vec<Entries> = (0..6).map(|n| std::array::from_fn(|k| ((n * n + 3 * k) as f64).cos())).collect();
-        // The last column is a single site after the one before, the last row three.
-        let spread = CovarianceMap::<f64>::new(&nodes, (NodeAxis::of(6), NodeAxis::of(4)), 0);
-        let (mut memory, mut row) = (Vec::new(), [0.0; 22]);
-        for y in 0..15 {
-            for k in 0..ENTRIES {
-                spread.row(k, y, &mut memory, &mut row);
-                for (x, value) in row.iter().enumerate() {
-                    assert!((value - spread.at(k, (x, y))).abs() < 1e-12, "{k} {x} {y}");
-                }
-            }
-        }
-        assert!((spread.at(0, (4, 0)) - 0.5 * (nodes[0][0] + nodes[1][0])).abs() < 1e-12);
-        assert!((spread.at(0, (9, 0)) - 0.5 * (nodes[1][0] + nodes[2][0])).abs() < 1e-12);
-        for beyond in [(10, 6), (21, 14)] {
-            assert!((spread.at(5, beyond) - nodes[5][5]).abs() < 1e-12);
-        }
-    }
-}

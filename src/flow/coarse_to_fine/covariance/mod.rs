@@ -207,19 +207,3 @@ fn add_acceleration(node: &mut Entries, &[u, v, u_x, v_x, u_y, v_y]: &[f64; 6]) 
     node[upper(0, 0)] += (ACCELERATION_SHARE * (u_x * u + u_y * v)).powi(2);
     node[upper(1, 1)] += (ACCELERATION_SHARE * (v_x * u + v_y * v)).powi(2);
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn noise_fills_the_blocks_of_flow_and_slopes() {
-        let left = RemainingNoise { density: [2.0, -0.5, 1.0], flow: 0.1, slopes: [0.01, 0.03] };
-        let mut node = [0.0; ENTRIES];
-        add_noise(&mut node, &left, [FLOW_NOISE_FACTOR[0], SLOPE_NOISE_FACTOR]);
-        assert!((node[upper(0, 1)] + FLOW_NOISE_FACTOR[0] * 0.05).abs() < 1e-15);
-        assert!((node[upper(2, 2)] - SLOPE_NOISE_FACTOR * 0.02).abs() < 1e-15);
-        assert!((node[upper(5, 5)] - SLOPE_NOISE_FACTOR * 0.03).abs() < 1e-15);
-        assert_eq!(node[upper(2, 4)], 0.0);
-    }
-}

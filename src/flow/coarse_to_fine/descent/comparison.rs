@@ -130,13 +130,4 @@ mod tests {
             assert_eq!(same.data(), moved.data());
         }
     }
-
-    #[test]
-    fn shares_count_neighbours_once() {
-        let mut wins = vec![false; 12];
-        wins[5] = true;
-        let share = |x, y| share_around(&wins, (4, 3), (x, y));
-        assert_eq!([share(1, 1), share(0, 1), share(2, 2), share(3, 1)], [0.25, 0.125, 0.0625, 0.0]);
-        assert_eq!(share_around(&[true], (1, 1), (0, 0)), 1.0);
-    }
 }

@@ -67,22 +67,3 @@ impl<T: SimdReal> Kernel<T> for Blend<'_, T> {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sites_go_to_near_motion_and_stay_before_far_one() {
-        let (mut motion, mut refined) = (Planes::<f64>::new(3, 2, MOTION), Planes::<f64>::new(3, 2, MOTION + 2));
-        for (x, u) in [0.01, HALF_WEIGHT_DISTANCE, 3.0].into_iter().enumerate() {
-            refined.line_mut(0, 1)[x] = u;
-            refined.line_mut(5, 1)[x] = 1.0;
-        }
-        blend_towards(Level::detect(), &mut motion, &refined);
-        let [near, half, far] = [0, 1, 2].map(|x| motion.at(5, x, 1));
-        assert!(near > 0.999_99 && (half - 0.5).abs() < 1e-12 && far < 2e-4, "{near} {half} {far}");
-        assert_eq!(motion.at(0, 1, 1), half * HALF_WEIGHT_DISTANCE);
-        assert!((0..3).all(|x| motion.at(0, x, 0) == 0.0));
-    }
-}

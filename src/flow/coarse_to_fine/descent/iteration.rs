@@ -150,24 +150,3 @@ pub(super) fn copy<T: SimdReal>(space: &PlanePool<T>, motion: &Planes<T>) -> Pla
     }
     out
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn few_sites_on_their_way_are_seen_but_not_along_the_edge() {
-        let (from, mut to) = (Planes::<f32>::new(9, 7, MOTION), Planes::<f32>::new(9, 7, MOTION));
-        to.data_mut().fill(0.09);
-        assert_eq!(moving_inside(&from, &to), 5 * 3, "the diagonal is distance: 0.127 px");
-        to.data_mut().fill(0.07);
-        assert_eq!(moving_inside(&from, &to), 0);
-        for (x, y, u) in [(4, 3, 2.0), (5, 3, -0.2), (1, 3, 2.0), (4, 0, 2.0)] {
-            to.line_mut(0, y)[x] = u;
-        }
-        assert_eq!(moving_inside(&from, &to), 2);
-        assert_eq!(moving((&from, &to), 0.15, (0..9, 0..7)), 4);
-        let tiny = Planes::<f32>::new(3, 1, MOTION);
-        assert_eq!(moving_inside(&tiny, &tiny), 0);
-    }
-}

@@ -202,18 +202,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn mirrors_do_not_repeat_the_edge_and_one_site_goes_on_unchanged() {
-        let mut f = Field::<f32>::new(3, 1, 1);
-        let at = f.start(0, 0) + LEFT;
-        f.data_mut()[at..at + 3].copy_from_slice(&[1.0, 2.0, 4.0]);
-        f.extend(0..1, Continuation::Even, 3);
-        assert_eq!(f.line(0, -2)[LEFT - 3..LEFT + 6], [2.0, 4.0, 2.0, 1.0, 2.0, 4.0, 2.0, 1.0, 2.0]);
-        let mut one = Field::<f32>::new(1, 1, 1);
-        let at = one.start(0, 0) + LEFT;
-        one.data_mut()[at] = 5.0;
-        one.extend(0..1, Continuation::Odd, RIM);
-        assert_eq!((one.line(0, 16)[0], one.line(0, -16)[2 * LEFT]), (5.0, 5.0));
-    }
 }

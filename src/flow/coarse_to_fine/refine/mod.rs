@@ -47,11 +47,6 @@ use rayon::prelude::*;
 use regional_means::Fitted;
 pub(super) use window_statistics::{SITES_PER_NODE, WindowStatistics, node_count};
 
-/// Planes of [`refine`]'s result: after the six of the motion, the mean sigma of the windows used, px; the
-/// last plane is the noise density `a`, px^4.
-#[cfg(test)]
-pub(super) const SIGMA: usize = 6;
-
 /// Refines the flow of `motion`, given the summary of the last data term.
 ///
 /// Returns eight planes: the motion, the mean sigma, the noise density of the given flow (its variance times

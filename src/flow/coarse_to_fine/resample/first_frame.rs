@@ -152,12 +152,6 @@ fn gather<V: Lanes>(data: &[V::Scalar], starts: &[usize; MAX_LANES], offset: usi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flow::coarse_to_fine::resample::motion_at;
-
-    /// `(I - M / 2)^-1 b` for a single site.
-    fn solved(m: &[f64; MOTION], b: [f64; 2]) -> [f64; 2] {
-        solve::<f64>(m, b)
-    }
 
     #[test]
     fn affine_motion_of_the_first_frame_is_exact() {
@@ -192,35 +186,6 @@ mod tests {
                 let v = d[1] + jacobian[1][0] * px + jacobian[1][1] * py;
                 let want = [u, v, jacobian[0][0], jacobian[1][0], jacobian[0][1], jacobian[1][1]];
                 (0..MOTION).for_each(|k| assert!((got.at(k, x, y) - want[k]).abs() < 1e-12, "{k} {x} {y}"));
-            }
-        }
-    }
-
-    #[test]
-    fn any_motion_is_read_where_its_pixel_is_midway() {
-        for (width, height) in [(1, 1), (1, 4), (5, 1), (21, 13)] {
-            let mut motion = Planes::<f64>::new(width, height, MOTION);
-            for k in 0..MOTION {
-                for y in 0..height {
-                    for x in 0..width {
-                        let wave = (1.3 * k as f64 + 0.4 * x as f64 - 0.7 * y as f64).sin();
-                        motion.line_mut(k, y)[x] = if k < 2 { 7.0 * wave } else { 0.1 * wave };
-                    }
-                }
-            }
-            for level in Level::available() {
-                let got = at_first_frame(level, &PlanePool::default(), &motion);
-                for y in 0..height {
-                    for x in 0..width {
-                        let (px, py) = (2.0 * x as f64, 2.0 * y as f64);
-                        let start: [f64; MOTION] = std::array::from_fn(|k| motion.at(k, x, y));
-                        let [u, v] = solved(&start, [start[0], start[1]]);
-                        let m = motion_at(&motion, 2.0, px + 0.5 * u, py + 0.5 * v);
-                        let ([a, b], [c, d]) = (solved(&m, [m[2], m[3]]), solved(&m, [m[4], m[5]]));
-                        let want = [m[0], m[1], a, b, c, d];
-                        (0..MOTION).for_each(|k| assert!((got.at(k, x, y) - want[k]).abs() < 1e-11, "{k} {x} {y}"));
-                    }
-                }
             }
         }
     }

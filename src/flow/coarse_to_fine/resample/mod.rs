@@ -188,40 +188,4 @@ mod tests {
         let m = motion_at(&want, 2.0, 26.5, 3.25);
         assert!((m[0] - (1.5 + 0.02 * 26.5 + 0.03 * 3.25)).abs() < 1e-12 && (m[3] + 0.01).abs() < 1e-15);
     }
-
-    #[test]
-    fn slopes_are_those_of_the_flow_between_sites() {
-        let mut motion = affine(9, 7, 1.0);
-        let want = motion.clone();
-        for y in 0..7 {
-            for x in 0..9 {
-                // A constant offset of the Jacobian has no effect.
-                for k in 2..MOTION {
-                    motion.line_mut(k, y)[x] += 0.5;
-                }
-            }
-        }
-        let mut out = Planes::default();
-        rederive(&motion, &mut out);
-        for k in 0..MOTION {
-            for y in 1..6 {
-                for x in 1..8 {
-                    assert!((out.at(k, x, y) - want.at(k, x, y)).abs() < 1e-12, "plane {k} at ({x}, {y})");
-                }
-            }
-        }
-        assert_eq!(out.at(2, 0, 3), motion.at(2, 0, 3));
-        let one = affine(1, 1, 1.0);
-        rederive(&one, &mut out);
-        assert_eq!(out.at(3, 0, 0), one.at(3, 0, 0));
-    }
-
-    #[test]
-    fn a_single_site_speaks_for_everything() {
-        let one = affine(1, 1, 1.0);
-        assert!((motion_at(&one, 2.0, 1.0, 1.0)[0] - 1.55).abs() < 1e-12);
-        let mut fine = Planes::default();
-        finer(Level::detect(), &one, (2, 1), &mut fine);
-        assert_eq!(fine.width, 1);
-    }
 }

@@ -5,7 +5,7 @@ use super::layers::is_inside;
 use super::patch::{Patch, Places, bounds_about, dilated, smooth};
 use super::pose::Pose;
 use super::task::{Task, Vote, VoteMask};
-use crate::track::gradient::noise::median;
+use crate::math::median;
 use crate::types::Frame;
 
 /// Longest step, px.
@@ -151,7 +151,7 @@ impl<'a> Level<'a> {
             .filter(|(k, node)| solid(node) && is_inside(places.get(*k), frame))
             .map(|(k, node)| (seen[k] - (1.0 - node.a) * behind[k]) / node.bright)
             .collect();
-        if ratios.is_empty() { before } else { median(&mut ratios).clamp(GAIN.0, GAIN.1) }
+        median(&mut ratios).map_or(before, |gain| gain.clamp(GAIN.0, GAIN.1))
     }
 }
 

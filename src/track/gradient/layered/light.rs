@@ -2,7 +2,7 @@
 
 use super::layers::{Background, grown};
 use super::samples::{MAX_RESIDUAL, MAX_RESIDUAL_RATIO, SCENE_MARGIN, spread};
-use crate::track::gradient::noise::median;
+use crate::math::median;
 use crate::types::{Frame, TargetBox};
 
 /// Pixels that the light is measured on, at most.
@@ -43,7 +43,7 @@ pub(super) fn light(frame: &Frame<f64>, background: &Background, target: TargetB
         |light: Light| pairs.iter().map(|[e, b]| (light.undone(*e) - b).abs().min(MAX_RESIDUAL)).sum::<f64>();
     let better = |light: Light, than: Light| residual(light) < MAX_RESIDUAL_RATIO * residual(than);
     let mut ratios: Vec<f64> = pairs.iter().filter(|[_, b]| *b > 1.0).map(|[e, b]| e / b).collect();
-    let gain = median(&mut ratios);
+    let gain = median(&mut ratios).unwrap_or(0.0);
     let possible = (0.1..10.0).contains(&gain) && (gain - 1.0).abs() >= MIN_GAIN_CHANGE;
     let brighter = Light { gain, ..Light::USUAL };
     let found = if crate::ablation::keeps("gradient.light_gain") && possible && better(brighter, Light::USUAL) {
@@ -52,7 +52,7 @@ pub(super) fn light(frame: &Frame<f64>, background: &Background, target: TargetB
         Light::USUAL
     };
     let mut differences: Vec<f64> = pairs.iter().map(|[e, b]| e - b).collect();
-    let jumped = Light { offset: median(&mut differences), ..Light::USUAL };
+    let jumped = Light { offset: median(&mut differences).unwrap_or(0.0), ..Light::USUAL };
     if crate::ablation::keeps("gradient.light_offset") && jumped.offset.abs() > MIN_LEVEL_JUMP && better(jumped, found)
     {
         jumped

@@ -57,35 +57,3 @@ fn around(target: TargetBox, (width, height): (usize, usize)) -> Vec<(usize, usi
     let pixels = rows.flat_map(|y| along(reach.x, reach.width, width).map(move |x| (x, y)));
     pixels.filter(|(x, y)| !holds(&hidden, *x, *y)).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const NOISE: f64 = 0.3;
-
-    /// Waves whose left half has moved by `left` px, and whose right half by `right`.
-    fn scene(left: f64, right: f64) -> Frame<f64> {
-        Frame::from_fn(240, 160, |x, y| {
-            let moved = x as f64 - if x < 120 { left } else { right };
-            let y = y as f64;
-            120.0 + 25.0 * (0.31 * moved + 0.05 * y).sin() * (0.23 * y).cos() + 15.0 * (0.11 * moved - 0.17 * y).sin()
-        })
-    }
-
-    #[test]
-    fn the_plane_behind_the_target_is_told() {
-        let target = TargetBox { x: 180.0, y: 70.0, width: 13.0, height: 13.0 };
-        let [before, now] = [scene(0.0, 0.0), scene(1.0, 3.0)];
-        let found = nearby((&before, &now), target, ([1.9, 0.0], [0.0; 2]), NOISE);
-        assert!((found[0] - 3.0).abs() < 0.1 && found[1].abs() < 0.1, "{found:?}");
-        let left = TargetBox { x: 50.0, ..target };
-        let found = nearby((&before, &now), left, ([1.9, 0.0], [0.0; 2]), NOISE);
-        assert!((found[0] - 1.0).abs() < 0.1 && found[1].abs() < 0.1, "{found:?}");
-        // Where the scene moves as one, or nothing is around, the motion is the scene's, to the last digit.
-        let as_one = scene(3.0, 3.0);
-        assert_eq!(nearby((&before, &as_one), target, ([2.98, 0.01], [0.0; 2]), NOISE), [2.98, 0.01]);
-        let nowhere = TargetBox::about([-1e6; 2], 0.0, 0.0);
-        assert_eq!(nearby((&before, &now), nowhere, ([1.9, 0.0], [0.0; 2]), NOISE), [1.9, 0.0]);
-    }
-}

@@ -130,18 +130,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn patches_know_where_they_are() {
-        let frame = Frame::from_fn(20, 15, |x, y| (3 * x + 5 * y) as f64);
-        let patch = Patch::cut(&frame, bounds_about([10.0, 7.0], [4.0, 3.0], frame.size()));
-        assert_eq!((patch.corner, patch.frame.size()), ([6, 4], (9, 7)));
-        let mut read = Vec::new();
-        patch.read(&Places { x: vec![9.5, -5.0], y: vec![6.25, -5.0] }, &mut read);
-        assert!((read[0] - (28.5 + 31.25)).abs() < 1e-12);
-        assert_eq!(read[1], frame.get(6, 4));
-        assert_eq!(bounds_about([-9.0, 40.0], [2.0, 2.0], (20, 15)), [[0, 1], [14, 15]]);
-    }
-
-    #[test]
     fn what_is_unknown_takes_no_part() {
         let mut frame = Frame::filled(12, 12, 4.0);
         frame.row_mut(5)[5] = f64::NAN;

@@ -4,6 +4,7 @@
 
 use super::kernels::{DerivativeKernels, REACH};
 use super::options::LocalFlowOptions;
+use crate::image::StructureTensor;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
 use std::ops::Range;
@@ -36,13 +37,13 @@ impl Equations {
     /// The step at a pixel (7), and whether it is accepted; `least` is the weakest gradient that counts.
     pub fn step(&self, at: usize, options: &LocalFlowOptions, least: f64) -> Option<([f64; 2], bool)> {
         let [xx, xy, yy, xt, yt, _] = std::array::from_fn(|k| f64::from(self.sums[k][at]));
-        let determinant = xx * yy - xy * xy;
+        let tensor = StructureTensor { xx, xy, yy };
+        let determinant = tensor.determinant();
         if determinant.is_nan() || determinant <= 0.0 {
             return None;
         }
-        let step = [-(yy * xt - xy * yt) / determinant, -(xx * yt - xy * xt) / determinant];
-        let (middle, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
-        let largest = middle + (half * half + xy * xy).sqrt();
+        let step = tensor.solve([-xt, -yt]);
+        let largest = tensor.larger_eigenvalue();
         let smallest = determinant / largest;
         let accepted = largest <= options.cond_max.powi(2) * smallest
             && smallest >= least * least * self.count

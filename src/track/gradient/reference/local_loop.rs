@@ -9,10 +9,9 @@ use super::extent::{Ends, Extent, ends};
 use super::local_flow::{LocalFlow, MeanFlow};
 use super::options::{Control, ReferenceOptions, Rules};
 use crate::image::Interpolation;
-use crate::math::MAD_TO_STD;
+use crate::math::robust_std;
 use crate::track::gradient::detect::detect_moving_target;
 use crate::track::gradient::gauss_markov::{GaussMarkovFilter, Measurement};
-use crate::track::gradient::noise::median;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 
 /// Pixels around the window that masks need.
@@ -306,7 +305,7 @@ impl LocalLoop {
     /// Three standard deviations of the accepted flow outside the target.
     fn automatic_min_speed(&self, flow: &LocalFlow) -> f64 {
         let mut sizes: Vec<f64> = self.around(flow).flat_map(|w| w.map(f64::abs)).collect();
-        (3.0 * MAD_TO_STD * median(&mut sizes)).max(MIN_SPEED)
+        (3.0 * robust_std(&mut sizes).unwrap_or(0.0)).max(MIN_SPEED)
     }
 
     /// Whether most of what is around the target moves, and is a good part of all that does: the camera

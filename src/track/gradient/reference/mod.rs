@@ -4,8 +4,7 @@
 //! (IPSJ), equations (1) to (26).
 //!
 //! A frame passes: derivative masks (`kernels`), the gradient equation in windows (`equations`), local flow
-//! and its mean over what moves (`local_flow`; `refine` repeats it by warping), the ends of what moves
-//! (`extent`), and the loop that filters and steers the window (`local_loop`).
+//! and its mean over what moves (`local_flow`), the ends of what moves (`extent`), and the loop that filters and steers the window (`local_loop`).
 
 mod equations;
 mod extent;
@@ -13,7 +12,6 @@ mod kernels;
 mod local_flow;
 mod local_loop;
 mod options;
-mod refine;
 
 pub use kernels::{DerivativeKernels, KernelMask, derivative_kernels};
 pub use local_flow::{LocalFlow, MeanFlow, local_flow};
@@ -21,4 +19,3 @@ pub(super) use local_loop::LocalLoop;
 pub use local_loop::SearchWindow;
 pub use options::LocalFlowOptions;
 pub use options::{Control, Method, ReferenceOptions};
-pub use refine::{RefineOptions, refine_flow};

@@ -123,20 +123,6 @@ fn of_the_parts_that_come_to_light_the_largest_is_it() {
 }
 
 #[test]
-fn what_is_measured_of_little_changes_the_velocity_little() {
-    let limits = Recognition::default();
-    for (support, depth_motion) in [(0.9, 1.0), (0.6, 1.0), (0.15, 0.25), (0.0, 0.0)] {
-        let mut all = association();
-        let mut carry =
-            |motion, support| all.carry(0, (Some(Measured { motion, support }), 1.0), CELL, &limits).unwrap().motion;
-        carry([2.0, 0.0, 0.0], 1.0);
-        // It is carried by what was measured all the same.
-        assert_eq!(carry([2.0, 0.0, 1.0], support), [2.0, 0.0, 1.0]);
-        assert_eq!(all.live[0].as_ref().unwrap().velocity, Some([2.0, 0.0, depth_motion]));
-    }
-}
-
-#[test]
 fn what_outgrows_the_track_of_a_part_is_the_lost_whole() {
     let limits = Recognition::default();
     let mut all = association();
@@ -158,19 +144,6 @@ fn what_outgrows_the_track_of_a_part_is_the_lost_whole() {
         all.associate(Clock::at(6), &[part([place, 10.0, 30.0], pixels)], 1.0, Some(&limits));
         assert_eq!(all.live[2].as_ref().unwrap().id, id, "{pixels} pixels at {place}");
     }
-}
-
-#[test]
-fn nobody_waits_for_ever_nor_without_a_history() {
-    let limits = Recognition::default();
-    let mut all = association();
-    all.set_lost(0.0, |k| k == 1);
-    all.associate(Clock::at(3), &[at(2, [40.0, 10.0, 20.0])], MIN_PIXELS, Some(&limits));
-    assert_eq!(all.live[2].as_ref().unwrap().id, 2);
-    all.carry(0, (Some(measured([0.0; 3])), 1.0), CELL, &limits).unwrap();
-    all.set_lost(3.0, |k| k == 0);
-    all.associate(Clock::at(14), &[at(1, [10.0, 10.0, 30.0])], MIN_PIXELS, Some(&limits));
-    assert_eq!(all.live[1].as_ref().unwrap().id, 3);
 }
 
 #[test]
@@ -212,42 +185,6 @@ fn what_is_mostly_covered_goes_on_where_it_went() {
     assert_eq!(all.live[0].as_ref().unwrap().position, [11.5, 10.0, 30.0]);
     all.associate(Clock::at(2), &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], MIN_PIXELS, Some(&limits));
     assert_eq!(all.live[0].as_ref().unwrap().position, [13.5, 10.0, 30.0]);
-}
-
-#[test]
-fn what_is_counted_in_steps_goes_by_time_where_steps_are_long() {
-    let limits = Recognition::default();
-    let late = |now: f64, gap: f64| Clock { now, gap, step_time: 1.0 };
-    let steady = || {
-        let mut all = association();
-        for _ in 0..2 {
-            all.carry(0, (Some(measured([2.0, 0.0, 0.0])), 1.0), CELL, &limits);
-        }
-        all
-    };
-    // Three ordinary steps of coasting are one that is two long, and no other like it.
-    let mut all = steady();
-    assert!(all.carry(0, (None, 2.0), CELL, &limits).unwrap().coasting);
-    assert_eq!(all.carry(0, (None, 2.0), CELL, &limits), None);
-    let mut all = steady();
-    let coasted = (0..40).take_while(|_| all.carry(0, (None, 0.1), CELL, &limits).is_some()).count();
-    assert_eq!(coasted, 30);
-    // Hidden from 0 on, seen again six ordinary steps later: two steps of three, or one of six.
-    for (now, gap) in [(6.0, 3.0), (6.0, 6.0)] {
-        let mut all = steady();
-        all.set_lost(0.0, |k| k == 0);
-        all.associate(late(now, gap), &[at(2, [22.0, 10.0, 30.0])], MIN_PIXELS, Some(&limits));
-        assert_eq!(all.live[2].as_ref().unwrap().id, 0);
-    }
-    // Waited for ten ordinary steps, however few steps these are.
-    let mut all = steady();
-    all.set_lost(0.0, |k| k == 0);
-    all.associate(late(10.5, 5.0), &[at(2, [31.0, 10.0, 30.0])], MIN_PIXELS, Some(&limits));
-    assert_eq!(all.live[2].as_ref().unwrap().id, 2);
-    // What is mostly covered goes on for the time that went by.
-    let mut all = steady();
-    all.associate(late(2.5, 2.5), &[Sighting { pixels: 30, ..at(0, [11.0, 10.0, 30.0]) }], MIN_PIXELS, Some(&limits));
-    assert_eq!(all.live[0].as_ref().unwrap().position, [15.0, 10.0, 30.0]);
 }
 
 #[test]

@@ -1,14 +1,19 @@
-use super::*;
-use crate::math::random::CounterRng;
-use crate::parallel::Threads;
+//! Halved frames and masks against the double sum.
 
-fn noise<T: SimdReal>(width: usize, height: usize) -> Frame<T> {
+use jacoflow::image::{halve, halve_into, halve_mask};
+use jacoflow::math::Real;
+use jacoflow::math::random::CounterRng;
+use jacoflow::parallel::Threads;
+use jacoflow::simd::Level;
+use jacoflow::types::Frame;
+
+fn noise<T: Real>(width: usize, height: usize) -> Frame<T> {
     let rng = CounterRng::new(3);
     Frame::from_fn(width, height, |x, y| T::from_f64(255.0 * rng.uniform((y * width + x) as u64)))
 }
 
 /// The double sum of the definition.
-fn naive<T: SimdReal>(frame: &Frame<T>, x: usize, y: usize) -> f64 {
+fn naive<T: Real>(frame: &Frame<T>, x: usize, y: usize) -> f64 {
     let (w, h) = frame.size();
     let (mut sum, mut total) = (0.0, 0.0);
     for j in -3isize..=3 {
@@ -25,26 +30,29 @@ fn naive<T: SimdReal>(frame: &Frame<T>, x: usize, y: usize) -> f64 {
 
 const SIZES: [(usize, usize); 9] = [(1, 1), (2, 1), (1, 6), (3, 2), (16, 9), (33, 40), (64, 35), (131, 3), (150, 71)];
 
-fn check<T: SimdReal>(tolerance: f64) {
-    for (w, h) in SIZES {
-        let frame = noise::<T>(w, h);
-        for level in Level::available() {
-            let half = halve(level, &frame);
-            assert_eq!(half.size(), (w.div_ceil(2), h.div_ceil(2)));
-            for y in 0..half.height() {
-                for x in 0..half.width() {
-                    let (got, want) = (half.get(x, y).to_f64(), naive(&frame, x, y));
-                    assert!((got - want).abs() < tolerance, "{w} x {h}, {level:?} at {x}, {y}: {got} {want}");
+macro_rules! check {
+    ($t:ty, $tolerance:expr) => {{
+        type T = $t;
+        for (w, h) in SIZES {
+            let frame = noise::<T>(w, h);
+            for level in Level::available() {
+                let half = halve(level, &frame);
+                assert_eq!(half.size(), (w.div_ceil(2), h.div_ceil(2)));
+                for y in 0..half.height() {
+                    for x in 0..half.width() {
+                        let (got, want) = (half.get(x, y).to_f64(), naive(&frame, x, y));
+                        assert!((got - want).abs() < $tolerance, "{w} x {h}, {level:?} at {x}, {y}: {got} {want}");
+                    }
                 }
             }
         }
-    }
+    }};
 }
 
 #[test]
 fn every_level_is_the_double_sum() {
-    check::<f32>(2e-4);
-    check::<f64>(1e-12);
+    check!(f32, 2e-4);
+    check!(f64, 1e-12);
 }
 
 #[test]

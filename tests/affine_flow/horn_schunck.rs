@@ -1,7 +1,11 @@
-use super::*;
-use crate::flow::{Estimator, Method};
-use crate::parallel::Threads;
-use crate::synth::{RotatingRamp, Scene};
+//! Horn and Schunck's baseline.
+
+use jacoflow::error::Error;
+use jacoflow::flow::baseline::{HornSchunckOptions, Smoothness};
+use jacoflow::flow::{Estimator, EstimatorOptions, Method};
+use jacoflow::parallel::Threads;
+use jacoflow::synth::{RotatingRamp, Scene};
+use jacoflow::types::{FlowField, Frame, Status};
 
 fn estimate(options: HornSchunckOptions, threads: usize, frames: &[Frame<f64>]) -> FlowField<f64> {
     let common = EstimatorOptions { threads: Threads::new(Some(threads)).unwrap(), ..EstimatorOptions::default() };
@@ -60,7 +64,7 @@ fn any_number_of_threads_gives_the_same_bits_and_nothing_moves_in_a_constant_ima
 }
 
 #[test]
-fn intensity_gain_changes_nothing_and_failure_to_converge_is_told() {
+fn intensity_gain_changes_nothing_and_failure_to_converge_is_an_error() {
     let frames = |gain: f64| -> Vec<Frame<f64>> {
         (0..3)
             .map(|t| {

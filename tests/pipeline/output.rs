@@ -1,5 +1,9 @@
-use super::*;
-use crate::pipeline::PictureRanges;
+//! Outputs named by their file endings.
+
+use jacoflow::error::Result;
+use jacoflow::io::FieldFormat;
+use jacoflow::pipeline::{OutputPlan, OutputWish, PictureKind, PictureRanges, TableTarget};
+use std::path::Path;
 
 fn decide(path: &Path, formats: &[&str], pictures: &[&str], fields: Option<usize>) -> Result<OutputPlan> {
     let words = |list: &[&str]| list.iter().map(ToString::to_string).collect::<Vec<_>>();

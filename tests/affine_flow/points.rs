@@ -1,9 +1,11 @@
-use super::*;
-use crate::math::median;
-use crate::parallel::Threads;
-use crate::simd::Level;
-use crate::synth::{AffineTexture, Scene};
-use crate::types::Frame;
+//! Flow at single points.
+
+use jacoflow::flow::points::{PointFlowOptions, PointPyramid, track_points};
+use jacoflow::math::median;
+use jacoflow::parallel::Threads;
+use jacoflow::simd::Level;
+use jacoflow::synth::{AffineTexture, Scene};
+use jacoflow::types::Frame;
 
 /// Frames 0 and 1 of a texture in uniform motion, noise-free and unrounded.
 fn pair(size: (usize, usize), flow: [f64; 2]) -> [Frame<f32>; 2] {

@@ -1,6 +1,8 @@
-use super::*;
-use crate::flow::{Estimator, Method};
-use crate::types::Mask;
+//! Lucas and Kanade's baseline.
+
+use jacoflow::flow::baseline::{Differences, LucasKanadeOptions, Window};
+use jacoflow::flow::{Estimator, EstimatorOptions, Method};
+use jacoflow::types::{FlowField, Frame, Mask, SamplingGrid, Status};
 
 /// Two crossed waves moving by (u, v) px/frame.
 fn frames(u: f64, v: f64) -> Vec<Frame<f64>> {

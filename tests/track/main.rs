@@ -1,0 +1,8 @@
+//! Trackers through the public API: parts of the gradient tracker, grey levels, options and graphs.
+
+mod detect;
+mod gauss_markov;
+mod grey_levels;
+mod particle_options;
+mod stereo_graph;
+mod stereo_options;
