@@ -224,34 +224,3 @@ fn temporary_beside(target: &Path) -> io::Result<NamedTempFile> {
     #[cfg(not(unix))]
     builder.tempfile_in(folder)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::fs;
-
-    #[cfg(unix)]
-    #[test]
-    fn links_and_modes_are_those_of_ordinary_files() {
-        use std::os::unix::fs::{PermissionsExt, symlink};
-        let folder = tempfile::tempdir().unwrap();
-        let (real, link, plain) = (folder.path().join("real"), folder.path().join("link"), folder.path().join("plain"));
-        fs::write(&real, b"old").unwrap();
-        symlink(&real, &link).unwrap();
-        atomic_io(&link, |f| f.write_all(b"new")).unwrap();
-        assert!(link.symlink_metadata().unwrap().is_symlink());
-        assert_eq!(fs::read(&real).unwrap(), b"new");
-        fs::write(&plain, b"").unwrap();
-        let mode = |p: &Path| p.metadata().unwrap().permissions().mode();
-        assert_eq!(mode(&real), mode(&plain));
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn a_device_is_written_not_replaced() {
-        use std::os::unix::fs::FileTypeExt;
-        let null = Path::new("/dev/null");
-        atomic_io(null, |f| f.write_all(b"gone")).unwrap();
-        assert!(null.metadata().unwrap().file_type().is_char_device());
-    }
-}

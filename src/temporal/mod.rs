@@ -6,10 +6,8 @@
 //!   precision by the first frame.
 //! * [`FlowStream`] estimates [`flow`](crate::flow) from frames that come one by one; [`recursive`] fuses its
 //!   estimates over time.
-//! * [`dynamics`] is the dynamical system of one pixel, the reference of the kernels.
 
 mod any_filter;
-pub mod dynamics;
 mod flow_filter;
 mod kernel;
 mod measurement;

@@ -2,6 +2,7 @@
 
 use jacoflow::error::Error;
 use jacoflow::io::{FlowImage, read_kitti, write_kitti};
+use proptest::prelude::*;
 
 #[test]
 fn flow_comes_back_and_what_does_not_fit_is_invalid() {
@@ -20,4 +21,28 @@ fn flow_comes_back_and_what_does_not_fit_is_invalid() {
     ::image::GrayImage::new(3, 3).save(&path).unwrap();
     assert!(read_kitti(&path).unwrap_err().to_string().contains("16-bit RGB"));
     assert!(matches!(read_kitti(folder.path().join("none.png")), Err(Error::Io { .. })));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn rounding_is_at_most_half_a_step(u in -511.9f32..511.9) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        write_kitti(&path, &FlowImage::new(1, 1, vec![u], vec![-512.0]).unwrap()).unwrap();
+        let back = read_kitti(&path).unwrap();
+        prop_assert!((back.u()[0] - u).abs() <= 0.5 / 64.0 + 1e-5 && back.v()[0] == -512.0);
+    }
+
+    #[test]
+    fn damage_never_makes_it_panic(at in 0usize..200, value: u8) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        write_kitti(&path, &FlowImage::new(4, 3, vec![1.0; 12], vec![2.0; 12]).unwrap()).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        let at = at % bytes.len();
+        bytes[at] = value;
+        std::fs::write(&path, &bytes).unwrap();
+        let _ = read_kitti(&path);
+    }
 }

@@ -21,6 +21,7 @@ mod picture_sequence;
 mod sink;
 mod sink_y4m;
 mod source;
+mod source_ffmpeg;
 mod source_files;
 mod source_memory;
 mod source_npy;

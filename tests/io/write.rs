@@ -10,6 +10,12 @@ fn names(folder: &Path) -> Vec<String> {
     fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
 }
 
+fn put(path: &Path, bytes: &[u8]) {
+    let mut file = AtomicFile::create(path).unwrap();
+    file.write_all(bytes).unwrap();
+    file.commit().unwrap();
+}
+
 #[test]
 fn a_file_appears_only_when_committed() {
     let folder = tempfile::tempdir().unwrap();
@@ -43,4 +49,29 @@ fn a_missing_folder_and_a_folder_as_target_name_the_path() {
     let error = AtomicFile::create(folder.path().join("no/such/x.npz")).unwrap_err();
     assert!(matches!(error, Error::Io { .. }) && error.to_string().contains("no/such/x.npz"));
     assert!(matches!(AtomicFile::create(folder.path()), Err(Error::Io { .. })));
+}
+
+#[cfg(unix)]
+#[test]
+fn links_and_modes_are_those_of_ordinary_files() {
+    use std::os::unix::fs::{PermissionsExt, symlink};
+    let folder = tempfile::tempdir().unwrap();
+    let (real, link, plain) = (folder.path().join("real"), folder.path().join("link"), folder.path().join("plain"));
+    fs::write(&real, b"old").unwrap();
+    symlink(&real, &link).unwrap();
+    put(&link, b"new");
+    assert!(link.symlink_metadata().unwrap().is_symlink());
+    assert_eq!(fs::read(&real).unwrap(), b"new");
+    fs::write(&plain, b"").unwrap();
+    let mode = |p: &Path| p.metadata().unwrap().permissions().mode();
+    assert_eq!(mode(&real), mode(&plain));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_device_is_written_not_replaced() {
+    use std::os::unix::fs::FileTypeExt;
+    let null = Path::new("/dev/null");
+    put(null, b"gone");
+    assert!(null.metadata().unwrap().file_type().is_char_device());
 }

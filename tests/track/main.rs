@@ -4,5 +4,6 @@ mod detect;
 mod gauss_markov;
 mod grey_levels;
 mod particle_options;
+mod particle_persist;
 mod stereo_graph;
 mod stereo_options;

@@ -1,10 +1,8 @@
 //! Motion models: what the flow around a pixel is assumed to be, and the equations that follow.
 //!
 //! A new model is one file beside this one, with a type that implements [`MotionModel`], and one line in the
-//! registry below. The registry makes the [`ModelKind`], its name for the command line and Python, and runs
-//! the shared conformance tests on the model.
-
-mod conformance;
+//! registry below. The registry makes the [`ModelKind`] and its name for the command line and Python; the
+//! tests that every model must pass (`tests/affine_flow/model.rs`) run through it.
 
 use crate::error::{Error, Result};
 use crate::jet::JetRates;
@@ -115,34 +113,11 @@ macro_rules! motion_models {
             }
 
             /// Calls `visitor` with the model's type.
-            pub(super) fn dispatch<V: ModelVisitor>(self, visitor: V) -> V::Output {
+            pub fn dispatch<V: ModelVisitor>(self, visitor: V) -> V::Output {
                 match self {
                     $(Self::$model => visitor.run::<$model, $n, $p>(),)*
                 }
             }
-        }
-
-        #[cfg(test)]
-        mod conform {
-            $(mod $module {
-                use crate::flow::model::{$model, conformance};
-                #[test]
-                fn parameters_are_what_their_names_say() {
-                    conformance::parameters::<$model, $n, $p>();
-                }
-                #[test]
-                fn truth_is_recovered_from_transported_brightness() {
-                    conformance::recovery::<$model, $n, $p>();
-                }
-                #[test]
-                fn equations_are_linear_in_the_jets() {
-                    conformance::linearity::<$model, $n, $p>();
-                }
-                #[test]
-                fn a_flat_patch_is_not_observable() {
-                    conformance::flat::<$model, $n, $p>();
-                }
-            })*
         }
     };
 }
@@ -158,7 +133,7 @@ motion_models! {
 }
 
 /// Operation on a model type that is chosen at run time by [`ModelKind::dispatch`].
-pub(super) trait ModelVisitor {
+pub trait ModelVisitor {
     /// What comes of it.
     type Output;
     /// Does it.
