@@ -7,6 +7,7 @@
 use jacoflow::flow::coarse_to_fine::{CoarseToFineOptions, Preset};
 use jacoflow::flow::{Estimator, EstimatorOptions, Method};
 use jacoflow::parallel::Threads;
+use jacoflow::simd::Level;
 use jacoflow::synth::{AffineTexture, Scene, Sensor, mean_truth};
 use jacoflow::types::{FlowField, Frame, Rect, SamplingGrid, Status};
 
@@ -49,7 +50,7 @@ fn errors(field: &FlowField<f32>, truth: &FlowField<f64>) -> (f64, f64) {
 #[test]
 fn motions_of_many_pixels_are_found_from_pairs_and_triples_by_every_preset() {
     let scene = scene(FAST);
-    // Pairs and triples tell the same: where the pixels are one frame later.
+    // Pairs and triples give the same: where the pixels are one frame later.
     let truth = mean_truth(&scene, 0.0, (0.0, 1.0)).unwrap();
     for preset in Preset::EVERY {
         // The fastest works at half the resolution.
@@ -70,7 +71,7 @@ fn motions_of_many_pixels_are_found_from_pairs_and_triples_by_every_preset() {
 }
 
 #[test]
-fn three_frames_tell_the_step_to_the_next_or_the_mean_of_both() {
+fn three_frames_give_the_step_to_the_next_or_the_mean_of_both() {
     let scene = scene(FAST);
     let frames = frames(&scene, 1.0, &[-1.0, 0.0, 1.0]);
     for (central, own, other) in [(false, (0.0, 1.0), (-1.0, 1.0)), (true, (-1.0, 1.0), (0.0, 1.0))] {
@@ -94,12 +95,12 @@ fn disc(t: f64, place: usize) -> Frame<f32> {
 }
 
 #[test]
-fn what_goes_out_of_sight_is_told() {
+fn what_goes_out_of_sight_is_inconsistent() {
     let field = estimate(CoarseToFineOptions::pair(), EstimatorOptions::default(), &[disc(0.0, 80), disc(1.0, 86)]);
     let share = |keep: &dyn Fn(f64, f64) -> bool| {
         let sites = (0..SIZE * SIZE).filter(|at| keep((at % SIZE) as f64 - 80.0, (at / SIZE) as f64 - 80.0));
-        let told: Vec<bool> = sites.map(|at| field.status[at] == Status::Inconsistent).collect();
-        told.iter().filter(|told| **told).count() as f64 / told.len() as f64
+        let marked: Vec<bool> = sites.map(|at| field.status[at] == Status::Inconsistent).collect();
+        marked.iter().filter(|marked| **marked).count() as f64 / marked.len() as f64
     };
     // The ground that the disc will cover, and what neither its old nor its new edge is near to.
     let hidden = share(&|x, y| x.hypot(y) > 40.5 && (x - 6.0).hypot(y) < 39.5 && y.abs() < 20.0);
@@ -112,7 +113,7 @@ fn what_goes_out_of_sight_is_told() {
 /// A disc that comes 1 px and goes on 3 px, over a ground that moves steadily: neither goes the way of a
 /// steady flow.
 #[test]
-fn things_that_accelerate_are_where_they_will_be() {
+fn objects_that_accelerate_are_where_they_will_be() {
     let frames = [(-1.0, 79), (0.0, 80), (1.0, 83)].map(|(t, place)| disc(t, place));
     let field = estimate(CoarseToFineOptions::default(), EstimatorOptions::default(), &frames);
     let mean = |keep: &dyn Fn(f64) -> bool| {
@@ -201,6 +202,23 @@ fn results_do_not_depend_on_threads_and_sites_are_those_of_the_whole_field() {
 }
 
 #[test]
+fn every_instruction_set_agrees_with_single_lanes() {
+    let frames = frames(&scene(FAST), 1.0, &[-1.0, 0.0, 1.0]);
+    let with = |level| {
+        let common = EstimatorOptions { simd: Some(level), covariance: true, ..EstimatorOptions::default() };
+        estimate(CoarseToFineOptions::default(), common, &frames)
+    };
+    let want = with(Level::SCALAR);
+    for level in Level::available() {
+        let got = with(level);
+        let near = got.motion.iter().zip(&want.motion).filter(|(a, b)| (*a - *b).abs() < 1e-3).count();
+        assert!(near * 1000 >= 999 * got.motion.len(), "{level:?}: {near} of {}", got.motion.len());
+        let agree = got.status.iter().zip(&want.status).filter(|(a, b)| a == b).count();
+        assert!(agree * 1000 >= 999 * got.len(), "{level:?}: {agree} of {}", got.len());
+    }
+}
+
+#[test]
 fn memory_kept_from_other_frames_changes_no_bit() {
     let (options, frames) = (CoarseToFineOptions::pair(), frames(&scene(FAST), 1.0, &[0.0, 1.0]));
     let fresh = estimate(options.clone(), EstimatorOptions::default(), &frames);
@@ -230,7 +248,7 @@ fn holes_get_their_status_and_their_surroundings_an_estimate() {
 }
 
 #[test]
-fn nothing_but_noise_is_told_apart_from_motion() {
+fn noise_alone_is_no_motion() {
     let blank = Frame::filled(SIZE, SIZE, 100.0);
     let noisy = |seed: u64| Sensor::eight_bit(3.0, seed).apply(&blank, seed).map(|&value| value as f32);
     let frames = [noisy(1), noisy(2)];

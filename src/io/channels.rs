@@ -223,13 +223,4 @@ mod tests {
         let stored_as_rgb = picture(3, vec![0.5_f32; 6]);
         assert_eq!(Grey::Error.frame(stored_as_rgb).unwrap(), AnyColourFrame::F32(Frame::filled(2, 1, [0.5; 3])));
     }
-
-    #[test]
-    fn samples_that_do_not_fill_the_picture_are_damage() {
-        for count in [1, 3] {
-            let short = || picture(count, vec![0.0_f64; count]);
-            assert!(matches!(Grey::Repeat.frame(short()), Err(Error::Format { .. })));
-            assert!(matches!(Colour::Luminance.frame(short()), Err(Error::Format { .. })));
-        }
-    }
 }

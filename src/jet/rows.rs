@@ -193,21 +193,3 @@ pub(crate) fn six_rows<T>(buffer: &mut [T], width: usize) -> [&mut [T]; 6] {
     let (o4, rest) = rest.split_at_mut(width);
     [o0, o1, o2, o3, o4, &mut rest[..width]]
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn starts_cover_the_range_and_stay_inside() {
-        for (range, lanes) in [(0..8, 8), (1..20, 8), (3..4, 1), (5..5, 1), (2..9, 8)] {
-            let mut seen = vec![false; range.end];
-            for s in starts(range.clone(), lanes) {
-                assert!(s >= range.start && s + lanes <= range.end);
-                seen[s..s + lanes].fill(true);
-            }
-            let want = range.len() >= lanes;
-            assert!(range.clone().all(|i| seen[i] == want), "{range:?}");
-        }
-    }
-}

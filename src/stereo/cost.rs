@@ -225,13 +225,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn gradients_are_rounded_to_the_nearest_step() {
-        for (value, step) in
-            [(0.49, 0), (0.51, 1), (-0.49, 0), (-0.51, -1), (MAX_GRADIENT, 8000), (-MAX_GRADIENT, -8000)]
-        {
-            assert_eq!(rounded(value), step, "{value}");
-        }
-    }
 }

@@ -74,26 +74,3 @@ pub fn parse_rate(text: &str) -> Result<f64, String> {
     };
     rate.map_err(|_| "expected a positive number or a fraction such as 30000/1001".into())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ranges_are_two_whole_numbers_in_order() {
-        assert_eq!(parse_range("-40, 24"), Ok((-40, 24)));
-        assert!(parse_range("3,2").is_err_and(|message| message.contains("2,3")));
-        assert!(parse_range("3").is_err() && parse_range("1.5,2").is_err());
-    }
-
-    #[test]
-    fn sizes_pairs_and_rates_are_read() {
-        assert_eq!(parse_size("9x7"), Ok((9, 7)));
-        assert_eq!(parse_size("5"), Ok((5, 5)));
-        assert!(parse_size("0x3").is_err() && parse_size("a").is_err());
-        assert_eq!(parse_pair("0.5"), Ok((0.5, 0.5)));
-        assert!(parse_pair("0.5,-1").is_err());
-        assert_eq!(parse_rate("30000/1000"), Ok(30.0));
-        assert!(parse_rate("nan").is_err() && parse_rate("0").is_err());
-    }
-}

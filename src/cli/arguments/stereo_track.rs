@@ -134,23 +134,3 @@ fn parse_cameras(text: &str) -> std::result::Result<StereoCamera, String> {
         _ => Err("expected FOCAL,BASELINE or FOCAL,BASELINE,INFINITY, the first two positive".into()),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn grids_are_two_or_three_counts() {
-        assert_eq!(parse_grid("30, 40"), Ok(CellGrid { rows: 30, columns: 40, layers: None }));
-        assert_eq!(parse_grid("30,40,16"), Ok(CellGrid { rows: 30, columns: 40, layers: Some(16) }));
-        assert!(["30", "1,2,3,4", "a,b", "-1,2", "1.5,2"].iter().all(|text| parse_grid(text).is_err()));
-    }
-
-    #[test]
-    fn cameras_are_two_lengths_and_a_disparity() {
-        let camera = StereoCamera { focal: 700.0, baseline: 0.54, d_infinity: 0.0 };
-        assert_eq!(parse_cameras("700,0.54"), Ok(camera));
-        assert_eq!(parse_cameras("700,0.54,-44"), Ok(StereoCamera { d_infinity: -44.0, ..camera }));
-        assert!(parse_cameras("700").is_err() && parse_cameras("0,1").is_err() && parse_cameras("1,2,3,4").is_err());
-    }
-}

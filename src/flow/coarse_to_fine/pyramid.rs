@@ -176,36 +176,3 @@ fn usable_counts(mask: &Mask, reach: usize) -> Frame<usize> {
     let along = Frame::from_fn(width, height, |x, y| around(x, width).filter(|&x| mask.get(x, y)).count());
     Frame::from_fn(width, height, |x, y| around(y, height).map(|y| along.get(x, y)).sum())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn pyramid(frames: &[&Frame<f32>], max_levels: Option<usize>) -> Pyramid<f32> {
-        let mut pyramid = Pyramid::default();
-        pyramid.fill(
-            Level::SCALAR,
-            frames,
-            BrightnessScale { mean: 0.0, gain: 1.0, contrast: 1.0 },
-            None,
-            (max_levels, 0),
-        );
-        pyramid
-    }
-
-    #[test]
-    fn holes_reach_as_far_as_the_stencils() {
-        let mut frame = Frame::<f32>::filled(20, 16, 1.0);
-        frame.row_mut(8)[10] = f32::NAN;
-        let pyramid = |frame: &Frame<f32>| pyramid(&[frame], Some(1));
-        let filled = pyramid(&frame);
-        let usable = filled.levels()[0].usable[0].as_ref().unwrap();
-        // A single pixel is filled well enough.
-        assert!(usable.data().iter().all(|usable| *usable));
-        (0..16).for_each(|y| frame.row_mut(y)[..6].fill(f32::NAN));
-        let filled = pyramid(&frame);
-        let usable = filled.levels()[0].usable[0].as_ref().unwrap();
-        assert!(!usable.get(7, 3) && usable.get(8, 3));
-        assert!(pyramid(&Frame::filled(9, 9, 1.0)).levels()[0].usable[0].is_none());
-    }
-}

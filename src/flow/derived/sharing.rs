@@ -96,32 +96,3 @@ fn scattered(points: &[(usize, usize)], correlation: &dyn Fn(f64) -> f64) -> f64
         points.iter().step_by(step).map(|a| points.iter().map(|b| correlation(squared(a, b))).sum()).collect();
     if sampled.is_empty() { 1.0 } else { sampled.iter().sum::<f64>() / sampled.len() as f64 }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn layout(sites: SamplingGrid, correlation_length: f64) -> FieldLayout {
-        FieldLayout {
-            frame_size: (9, 5),
-            sites,
-            model: "affine".into(),
-            parameters: Vec::new(),
-            frame_period: None,
-            pixel_pitch: (1.0, 1.0),
-            frame_index: 0,
-            correlation_length,
-        }
-    }
-
-    #[test]
-    fn a_grid_and_the_list_of_its_pixels_share_alike() {
-        let pixels: Vec<_> = (0..5).step_by(2).flat_map(|y| (0..9).step_by(2).map(move |x| (x, y))).collect();
-        let grid = sharing(&layout(SamplingGrid::Grid { region: None, stride: 2 }, 1.5));
-        let list = sharing(&layout(SamplingGrid::Points(pixels), 1.5));
-        assert!((grid - list).abs() < 1e-12 && grid > 2.0, "{grid} {list}");
-        let all: Vec<usize> = (0..5 * 3).collect();
-        let among = sharing_among(&layout(SamplingGrid::Grid { region: None, stride: 2 }, 1.5), 5, &all);
-        assert!((grid - among).abs() < 1e-3, "{grid} {among}");
-    }
-}

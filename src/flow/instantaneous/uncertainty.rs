@@ -242,25 +242,4 @@ mod tests {
         check::<f64>(1e-13);
         check::<f32>(1e-5);
     }
-
-    #[test]
-    fn residuals_that_rounding_explains_are_not_trusted() {
-        let mut r = rates(1);
-        let stencil = JetStencil::new(&Neighbourhood::square(3), (1.0, 1.0)).unwrap();
-        let noise = NoiseModel::new(&stencil, TimeScheme::Central, None).lanes();
-        let (a, b) = Affine::equations(&r);
-        let m = solve(&a, &b, 0.0).x;
-        let along = |i: &[f64; 6]| Affine::brightness_jacobian(i).map(|row| (0..6).map(|k| row[k] * m[k]).sum::<f64>());
-        r.first = along(&r.jet);
-        r.second = along(&r.first);
-        let [_, jet @ ..] = r.jet;
-        let lanes = LaneRates { jet, minus_first: r.first.map(|v| -v), second: r.second };
-        let detail = Detail { diagnostics: false, ..BOTH };
-        let trust = |known: &LaneNoise<f64>| {
-            estimate_affine(&lanes, 128.0, noise_square::<f64>(), known, detail, &mut factor_memory()).trust
-        };
-        assert!(trust(&noise) <= 0.0);
-        // With a known noise the residual is not needed.
-        assert!(trust(&LaneNoise { variance: Some(1.0), ..noise }) > 0.0);
-    }
 }

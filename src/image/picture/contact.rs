@@ -72,19 +72,3 @@ fn draw_focus(picture: &mut Picture, at: [f64; 2], covariance: &[[f64; 2]; 2]) {
         picture.blend(x.round() as isize, y.round() as isize, FOCUS, 1.0);
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn near_points_are_red_far_ones_blue_and_the_focus_is_a_cross() {
-        let mut picture = Picture::filled(60, 40, [100; 3]);
-        let marks = [ContactMark { at: [10.0, 10.0], rate: -0.1 }, ContactMark { at: [40.0, 10.0], rate: 0.1 }];
-        draw_contacts(&mut picture, &marks, 3.0, Some(([30.0, 25.0], [[4.0, 0.0], [0.0, 1.0]])));
-        let (near, far) = (picture.pixel(10, 10), picture.pixel(40, 10));
-        assert!(near[0] > near[2] && far[2] > far[0], "{near:?} {far:?}");
-        assert_eq!((picture.pixel(30, 20), picture.pixel(35, 25), picture.pixel(1, 1)), (FOCUS, FOCUS, [100; 3]));
-        draw_contacts(&mut picture, &[], 3.0, Some(([f64::NAN, 0.0], [[1.0, 0.0], [0.0, 1.0]])));
-    }
-}

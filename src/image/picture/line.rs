@@ -33,18 +33,3 @@ fn distance_to_segment(point: (f64, f64), from: (f64, f64), to: (f64, f64)) -> f
     let along = if length2 > 0.0 { ((px * dx + py * dy) / length2).clamp(0.0, 1.0) } else { 0.0 };
     (px - along * dx).hypot(py - along * dy)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_horizontal_stroke_covers_its_row_fully_and_neighbours_partly() {
-        let mut picture = Picture::filled(9, 5, [0; 3]);
-        draw_stroke(&mut picture, (2.0, 2.0), (6.0, 2.0), 1.5, [200; 3]);
-        assert_eq!(picture.pixel(4, 2), [200; 3]);
-        assert_eq!(picture.pixel(4, 1), [50; 3]);
-        assert_eq!(picture.pixel(4, 0), [0; 3]);
-        assert_eq!(picture.pixel(0, 2), [0; 3]);
-    }
-}

@@ -91,28 +91,3 @@ fn colour(wheel: &[[f64; 3]], u: f64, v: f64) -> Option<Rgb> {
         (255.0 * value).floor() as u8
     }))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn wheel_has_55_hues_between_pure_corners() {
-        let wheel = wheel();
-        assert_eq!(wheel.len(), 55);
-        assert_eq!((wheel[0], wheel[15], wheel[21]), ([1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]));
-    }
-
-    #[test]
-    fn directions_have_their_colours() {
-        let wheel = wheel();
-        assert_eq!(colour(&wheel, 0.0, 0.0), Some([255; 3]));
-        assert_eq!(colour(&wheel, 1.0, 0.0), Some([255, 0, 0]), "right is red");
-        let [r, g, b] = colour(&wheel, 0.0, 1.0).unwrap();
-        assert!(r > 200 && g > 200 && b < 30, "down is yellow, not {r} {g} {b}");
-        let [r, g, b] = colour(&wheel, -1.0, 0.0).unwrap();
-        assert!(r < 30 && g > 180 && b > 200, "left is cyan, not {r} {g} {b}");
-        let [r, _, b] = colour(&wheel, 0.0, -1.0).unwrap();
-        assert!(b > 200 && r > 60, "up is violet");
-    }
-}

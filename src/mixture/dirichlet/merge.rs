@@ -112,16 +112,3 @@ fn entropy_lost(weights: &[f64], shares: &[Vec<f64>], (i, j): Pair) -> f64 {
     let shared = points.filter(|(w, (a, b))| **w > 0.0 && a.min(**b) > MIN_SHARE);
     shared.map(|(w, (a, b))| w * (a * ((a + b) / a).ln() + b * ((a + b) / b).ln())).sum()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn smallest_responsibilities_lose_no_entropy() {
-        let smallest = f64::from_bits(1);
-        let shares = [vec![1.0, 0.5, smallest], vec![smallest, 0.5, 0.0]];
-        let lost = entropy_lost(&[1.0, 2.0, 1.0], &shares, (0, 1));
-        assert!((lost - 2.0 * std::f64::consts::LN_2).abs() < 1e-15, "{lost}");
-    }
-}

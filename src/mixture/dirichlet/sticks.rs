@@ -79,26 +79,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn proportions_sum_to_one() {
-        for inference in [Inference::Map, Inference::Vb] {
-            for alpha in [0.2, 1.0, 3.0] {
-                for counts in [&[7.0, 3.0, 0.5][..], &[4.0, 0.0, 0.0], &[2.0]] {
-                    let sum: f64 = proportions(counts, alpha, inference).iter().sum();
-                    assert!((sum - 1.0).abs() < 1e-14, "{inference:?}, {alpha}, {counts:?}: {sum}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn with_concentration_one_the_mode_is_the_share_of_the_points() {
-        let got = proportions(&[6.0, 3.0, 1.0, 0.0], 1.0, Inference::Map);
-        for (got, want) in got.iter().zip([0.6, 0.3, 0.1, 0.0]) {
-            assert!((got - want).abs() < 1e-15, "{got} {want}");
-        }
-    }
-
-    #[test]
     fn the_evidence_is_the_integral_over_the_stick() {
         // K = 2: one stick, `int alpha (1 - v)^(alpha - 1) v^n (1 - v)^t dv` by the midpoint rule.
         let (n, t, alpha, steps) = (3.0, 2.0, 1.7, 200_000);

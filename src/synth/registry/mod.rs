@@ -1,32 +1,19 @@
 //! Scenes by name, for the binary and for Python.
 //!
-//! A scene is a motion and what it carries, or something of its own. A new motion, carrier or scene is one
-//! file here with one constant in it, plus one line in the list it belongs to: [`SCENES`] or [`CARRIERS`].
+//! A scene is a motion and what it carries, or something of its own. A new one is a constant
+//! in `scenes` or `carriers`, and its name in the list there.
 
-mod affine;
-mod disc;
-mod noise;
-mod particles;
-mod plane;
-mod ramp;
-mod shear;
-mod speckle;
-mod turbulence;
-mod vortex;
-mod waves;
+mod carriers;
+mod scenes;
+
+pub use carriers::CARRIERS;
+pub use scenes::SCENES;
 
 use super::Scene;
 use super::carried::Carried;
 use super::motion::Motion;
 use super::texture::Texture;
 use crate::error::{Error, Result};
-
-/// Every scene, by name.
-pub const SCENES: &[SceneKind] =
-    &[ramp::KIND, affine::KIND, plane::KIND, disc::KIND, vortex::KIND, shear::KIND, turbulence::KIND, waves::KIND];
-
-/// Everything that a motion can carry, by name. The first is the default.
-pub const CARRIERS: &[CarrierKind] = &[noise::KIND, speckle::KIND, particles::KIND];
 
 /// A number that a scene or carrier can be given.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +24,11 @@ pub struct Parameter {
     pub default: Option<f64>,
     /// What it is, and its unit.
     pub meaning: &'static str,
+}
+
+/// A parameter.
+const fn number(name: &'static str, default: Option<f64>, meaning: &'static str) -> Parameter {
+    Parameter { name, default, meaning }
 }
 
 type AnyScene = Result<Box<dyn Scene>>;

@@ -56,17 +56,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn distances_are_those_to_the_edge() {
-        let line = Shape::Capsule { ends: [[0.0, 0.0], [6.0, 8.0]], radius: 1.0 };
-        assert_eq!((line.distance([3.0, 4.0]), line.distance([-3.0, -4.0])), (-1.0, 4.0));
-        assert!((line.distance([3.0 + 4.0, 4.0 - 3.0]) - 4.0).abs() < 1e-12);
-        assert_eq!(Shape::disc([1.0, 1.0], 2.0).distance([4.0, 5.0]), 3.0);
-        let plate = Shape::Rectangle { centre: [0.0, 0.0], half: [5.0, 3.0], corner: 1.0 };
-        assert_eq!((plate.distance([7.0, 0.0]), plate.distance([0.0, 2.0])), (2.0, -1.0));
-        assert!((plate.distance([4.0 + 3.0, 2.0 + 4.0]) - 4.0).abs() < 1e-12);
-    }
-
-    #[test]
     fn coverage_adds_up_to_the_area() {
         let sum = |shape: Shape| -> f64 {
             (-20..=20).flat_map(|y| (-20..=20).map(move |x| [x as f64, y as f64])).map(|p| shape.coverage(p)).sum()

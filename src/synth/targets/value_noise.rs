@@ -50,27 +50,3 @@ impl Lattice {
         row(0) + lower_share * (row(1) - row(0))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lattice_points_are_uniform_and_lines_between_them_are_straight() {
-        let noise = value_noise(CounterRng::new(3), (1200, 900), &[(4.0, 2.0)]);
-        let points: Vec<f64> = (0..900)
-            .step_by(4)
-            .flat_map(|y| (0..1200).step_by(4).map(move |x| (x, y)))
-            .map(|(x, y)| noise.get(x, y))
-            .collect();
-        let mean = points.iter().sum::<f64>() / points.len() as f64;
-        let variance = points.iter().map(|v| v * v).sum::<f64>() / points.len() as f64;
-        assert!(mean.abs() < 0.02 && (variance - 4.0 / 3.0).abs() < 0.03, "{mean} {variance}");
-        assert!(points.iter().all(|v| v.abs() <= 2.0));
-        for x in [1, 2, 3] {
-            let share = x as f64 / 4.0;
-            let straight = (1.0 - share) * noise.get(8, 12) + share * noise.get(12, 12);
-            assert!((noise.get(8 + x, 12) - straight).abs() < 1e-12);
-        }
-    }
-}

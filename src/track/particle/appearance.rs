@@ -184,14 +184,4 @@ mod tests {
             assert!((half - 0.5).abs() < 0.06, "{half}");
         }
     }
-
-    #[test]
-    fn common_surroundings_count_less() {
-        // Half of the box has the colour of what is around it.
-        let bins = Frame::from_fn(60, 60, |x, _| if (20..30).contains(&x) { 3 } else { 7 });
-        let bounds = [29.5, 29.5, 20.0, 48.0];
-        let (plain, weighted) = (Appearance::learn(&bins, bounds, false), Appearance::learn(&bins, bounds, true));
-        let elsewhere = [50.0, 29.5, 18.0, 48.0];
-        assert!(weighted.similarity(&bins, elsewhere) < 0.8 * plain.similarity(&bins, elsewhere));
-    }
 }

@@ -178,25 +178,8 @@ fn size_steps(noise: &Noise, first: f64, second: f64) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::options::ParticleMode;
+
     use super::*;
-
-    fn cloud(count: usize) -> Cloud {
-        let start =
-            Start { mean: [50.0, 40.0, 1.0, -0.5, 20.0, 44.0], noise: Noise::of(ParticleMode::Paper, 0.5), scale: 0.5 };
-        Cloud::begin(&start, count, stream(1, 7, 0, Purpose::Start))
-    }
-
-    #[test]
-    fn the_start_has_the_specified_spread() {
-        let cloud = cloud(20_000);
-        let mean = cloud.mean();
-        let sd: Vec<f64> = cloud.covariance(&mean).iter().enumerate().map(|(i, row)| row[i].sqrt()).collect();
-        for (got, want) in sd.iter().zip([3.25, 3.25, 1.5, 1.5, 0.2, 0.44]) {
-            assert!((got / want - 1.0).abs() < 0.03, "{got} {want}");
-        }
-        assert!((mean[0] - 50.0).abs() < 0.1 && (mean[3] + 0.5).abs() < 0.05);
-    }
 
     #[test]
     fn prediction_moves_with_camera_and_velocity_and_limits_the_size() {

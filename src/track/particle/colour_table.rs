@@ -189,14 +189,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn a_cut_table_serves_the_boxes_inside() {
-        let bins = Frame::from_fn(80, 60, |x, y| ((x / 5 + y / 4) % 20) as u8);
-        let appearance = Appearance::learn(&bins, [40.0, 30.0, 20.0, 24.0], true);
-        let table = ColourTable::new(&appearance, &bins, [25.0, 55.0], [15.0, 46.0]);
-        let mut out = [0.0];
-        table.similarities(&[[41.0, 31.0, 20.0, 24.0]], &mut out);
-        assert!((out[0] - appearance.similarity(&bins, [41.0, 31.0, 20.0, 24.0])).abs() < 1e-5);
-    }
 }

@@ -231,7 +231,6 @@ fn region_means(component: &Gaussian, labels: &Labels, areas: &[u32]) -> Vec<f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::random::CounterRng;
 
     #[test]
     fn rows_follow_the_formula() {
@@ -247,37 +246,5 @@ mod tests {
         let mut beyond = 0.0;
         Gaussian { mean: [-500.0, 5.0], ..gaussian }.along_row(5, 60, |_, ratio| beyond += ratio);
         assert!(beyond < 60.0 * NEGLIGIBLE);
-    }
-
-    #[test]
-    fn the_map_is_high_where_corners_move() {
-        let track = |k: u64, position: [f64; 2], foreground| Track {
-            id: k,
-            position,
-            flow: [0.0; 2],
-            residual: Some([0.0; 2]),
-            last_residual: None,
-            foreground,
-            owner: None,
-        };
-        let rng = CounterRng::new(1);
-        let place = |k: u64, x: f64, y: f64, s: f64| [x + s * rng.normal(2 * k), y + s * rng.normal(2 * k + 1)];
-        let moving = (0..30).map(|k| track(k, place(k, 40.0, 30.0, 4.0), 0.95));
-        let tracks: Vec<Track> = moving.chain((30..60).map(|k| track(k, place(k, 40.0, 30.0, 30.0), 0.005))).collect();
-        let labels = Labels {
-            width: 80,
-            height: 60,
-            labels: (0..80 * 60).map(|i| i % 80 / 8 + 10 * (i / 80 / 8)).collect(),
-            count: 80,
-        };
-        let map = ForegroundMap::new(&tracks, labels, 0.5, &ParticleOptions::default()).unwrap();
-        let picture = map.picture();
-        assert_eq!(picture.get(40, 30), 1.0);
-        assert!(picture.get(2, 2) < 1e-3);
-        let particles =
-            [[40.0, 30.0, 0.0, 0.0, 9.0, 9.0], [2.0, 2.0, 0.0, 0.0, 9.0, 9.0], [-9.0, 2.0, 0.0, 0.0, 9.0, 9.0]];
-        let values = map.at(&particles, [45.0, 30.0]).unwrap();
-        assert!(values[0] > 100.0 * values[1] && values[2] == 0.0);
-        assert_eq!(map.at(&particles, [79.0, 30.0]), None);
     }
 }

@@ -147,30 +147,4 @@ mod tests {
         assign(&mut tracks, &hidden, 1.0);
         assert_eq!(tracks[0].owner, None);
     }
-
-    #[test]
-    fn a_target_that_stops_keeps_its_tracks_and_one_that_covers_takes_none() {
-        let targets = [target(1, 50.0, [3.0, 0.0]), target(2, 55.0, [-3.0, 0.0])];
-        // All jump at once: the target itself has stopped.
-        let stopped = |_| Track { last_residual: Some([3.0, 0.0]), ..track([45.0, 50.0], [0.0, 0.0], 0.5, Some(1)) };
-        let mut tracks = [0, 1, 2, 3].map(stopped);
-        review(&mut tracks, &targets, 1.0);
-        assert!(tracks.iter().all(|track| track.owner == Some(1)));
-        // One of many moves with the other target, in its box.
-        let mut tracks =
-            [0, 1, 2, 3].map(|k| track([50.0, 50.0], if k == 0 { [-3.0, 0.0] } else { [3.0, 0.0] }, 0.9, Some(1)));
-        review(&mut tracks, &targets, 1.0);
-        assert_eq!(tracks.map(|track| track.owner), [None, Some(1), Some(1), Some(1)]);
-    }
-
-    #[test]
-    fn doubtful_tracks_lose_their_label_while_the_colours_are_unlike() {
-        for (unlike, owner) in [(false, Some(1)), (true, None)] {
-            let targets = [Labelled { is_unlike: unlike, ..target(1, 50.0, [3.0, 0.0]) }];
-            let mut tracks =
-                [0, 1, 2, 3].map(|k| track([50.0, 50.0], [3.0, 0.0], if k == 0 { 0.1 } else { 0.9 }, Some(1)));
-            review(&mut tracks, &targets, 1.0);
-            assert_eq!(tracks.map(|track| track.owner), [owner, Some(1), Some(1), Some(1)]);
-        }
-    }
 }

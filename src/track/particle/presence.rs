@@ -179,17 +179,4 @@ mod tests {
             assert_eq!(presence.is_hidden(), hidden);
         }
     }
-
-    #[test]
-    fn noise_grows_while_hidden() {
-        let mut presence = settled();
-        presence.judge(0.1);
-        let mut before = 0.0;
-        for _ in 0..40 {
-            presence.decide(0, false, 0);
-            assert!(presence.noise() >= before);
-            before = presence.noise();
-        }
-        assert!(presence.is_lost() && before == 1.0);
-    }
 }

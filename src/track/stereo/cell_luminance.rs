@@ -143,20 +143,4 @@ mod tests {
         }
         assert_ne!(picture(0, 0).find(&template, &picture(3, -2), 2).unwrap().shift, [3, -2]);
     }
-
-    #[test]
-    fn levels_are_means_cut_down() {
-        let mut frame = Frame::filled(160, 120, 7.9f32);
-        frame.row_mut(0)[0] = f32::NAN;
-        frame.row_mut(0)[8..16].fill(255.0);
-        for y in 112..120 {
-            frame.row_mut(y)[..8].fill(f32::NAN);
-        }
-        let cells = CellLuminance::new(&frame, &lattice());
-        // (255 + 7 x 7.9) / 8 = 38.79, a quarter of it 9.7.
-        assert_eq!((cells.level(0, 0), cells.level(1, 0)), (Some(1), Some(9)));
-        assert_eq!((cells.level(0, 14), cells.level(-1, 0), cells.level(20, 0)), (None, None, None));
-        let brighter = cells.exposed(&Exposure { gain: 2.0, offset: 8.0 });
-        assert_eq!((brighter.level(0, 0), brighter.level(1, 0), brighter.level(0, 14)), (Some(5), Some(21), None));
-    }
 }

@@ -165,15 +165,6 @@ mod tests {
     }
 
     #[test]
-    fn affine_motions_are_compared_where_the_pixels_are() {
-        let clusters = synthetic_clusters(&[([10, 5, 9], 0), ([12, 5, 9], 1)], 2);
-        // Both x - 90 about different centres.
-        let growing = |centre: f64| {
-            Some(GroupMotion { affine: [centre - 90.0, 0.0, 1.0, 0.0, 0.0, 0.0], centre: [centre, 0.0], depth: 0.0 })
-        };
-        assert_eq!(groups(&clusters, &[growing(0.0), growing(200.0)], &Grouping::default()), [0, 0]);
-    }
-    #[test]
     fn nearer_parts_of_what_comes_nearer_come_faster() {
         // Disparities -30 and -10, 40 and 60 px from infinity at -70: parts of one object that grow by a
         // fiftieth and by three hundredths a step.

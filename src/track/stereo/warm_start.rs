@@ -131,17 +131,6 @@ pub(super) mod tests {
         }
     }
 
-    /// The same with a third one elsewhere.
-    pub fn with_a_third() -> Posterior {
-        let mut three = posterior();
-        for of in [&mut three.weight_concentration, &mut three.mean_precision, &mut three.degrees_of_freedom] {
-            of.push(60.0);
-        }
-        three.means.extend([5.0, 55.0, 50.0]);
-        three.scale_inverses.extend_from_slice(&posterior().scale_inverses[..9]);
-        three
-    }
-
     #[test]
     fn means_are_moved_by_their_motions() {
         let got = moved(&posterior(), &[Some([1.0, -2.0, 0.5]), None]);
@@ -167,29 +156,5 @@ pub(super) mod tests {
         let scatter = |i: usize| posterior.scale_inverses[9 + 4 * i] - COVARIANCE_PRIOR - 45.0 / 12.0;
         assert!((scatter(0) - 30.0).abs() < 1e-9 && (scatter(1) - 30.0).abs() < 1e-9 && scatter(2).abs() < 1e-9);
         assert_eq!(reseed(&mut posterior, &voxels, &points).unwrap().unwrap().seeds, [false, false]);
-    }
-
-    #[test]
-    fn what_comes_to_light_gets_one_seed_and_another_scene_none() {
-        let block =
-            |at: [u16; 3], width: u16, n: u16| (0..n).map(move |i| ([at[0] + i % width, at[1] + i / width, at[2]], 0));
-        // Explained, a strip far wider than a seed, and two voxels too few to be anything.
-        let cells: Vec<_> = block([10, 10, 30], 3, 9)
-            .flat_map(|cell| [cell; 20])
-            .chain(block([40, 20, 20], 12, 72))
-            .chain(block([70, 5, 60], 2, 2))
-            .collect();
-        let voxels = synthetic_clusters(&cells, 1).voxels;
-        let (values, weights) = (voxels.places(), voxels.weights());
-        let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
-        let mut three = with_a_third();
-        let seeded = reseed(&mut three, &voxels, &points).unwrap().unwrap();
-        // The second is the likeliest for all that the first does not explain, and keeps its place.
-        assert_eq!(seeded.seeds, [false, false, true]);
-        assert_eq!(seeded.outliers.iter().map(|&n| voxels.cells[n][2]).collect::<Vec<_>>(), [60, 60]);
-        // Moved away from what it explained.
-        let mut lost = posterior();
-        lost.means[0] = 30.0;
-        assert_eq!(reseed(&mut lost, &voxels, &points).unwrap(), None);
     }
 }

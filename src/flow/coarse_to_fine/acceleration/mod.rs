@@ -211,22 +211,4 @@ mod tests {
     pub(super) fn rotation(w: f64) -> Planes<f64> {
         filled(|k, x, y| [-w * (y - 15.0), w * (x - 20.0), 0.0, w, -w, 0.0][k])
     }
-
-    #[test]
-    fn the_share_of_steady_flow_is_found_beside_objects_with_their_own_ways() {
-        let steady = steady::half_acceleration(&PlanePool::default(), &rotation(0.03));
-        let seen = |share: f64| {
-            let mut change = steady.clone();
-            change.data_mut().iter_mut().for_each(|m| *m *= share);
-            (0..15).for_each(|y| change.line_mut(0, y)[14..].fill(0.5));
-            change
-        };
-        for want in [0.0, 0.4, 1.0] {
-            let got = share(&seen(want), &steady);
-            assert!((got - want).abs() < 0.1, "{got} {want}");
-        }
-        assert_eq!(share(&seen(-1.0), &steady), 0.0);
-        let nothing = Planes::<f64>::new(20, 15, MOTION);
-        assert_eq!(share(&nothing, &nothing), 0.0);
-    }
 }

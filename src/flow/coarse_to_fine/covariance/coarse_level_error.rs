@@ -195,31 +195,4 @@ mod tests {
         assert_eq!(row[..4], [0.0; 4]);
         assert!(row.windows(2).all(|pair| pair[0] <= pair[1]));
     }
-
-    #[test]
-    fn only_directions_without_texture_inherit() {
-        let side = 97usize;
-        let (slanted, coarser) = ([0.5, 0.5, 0.5], [constant(49, 0.5 * 1.1, 0.01)]);
-        let sites = |here: UnconstrainedDirections| -> Vec<UnconstrainedDirections> {
-            (0..side * side).map(|n| if (24..73).contains(&(n % side)) { here } else { NONE }).collect()
-        };
-        let nodes = side.div_ceil(SITES_PER_NODE);
-        let found = |sites: &[UnconstrainedDirections]| {
-            CoarseLevelErrors::new(
-                &constant(side, 1.0, 0.0),
-                &coarser,
-                ConstrainedDirections::with((side, sites), (nodes, nodes), |_| true),
-            )
-            .at_nodes((nodes, nodes))
-        };
-        let (partly, wholly) = (found(&sites(slanted)), found(&sites(ALL)));
-        for (partly, wholly) in partly.iter().zip(&wholly).filter(|(_, wholly)| wholly.variances[1] > 0.0) {
-            assert_eq!(partly.variances, wholly.variances);
-            assert_eq!(wholly.directions, [1.0, 0.0, 1.0]);
-            assert!(partly.directions.iter().all(|entry| (entry - 0.5).abs() < 1e-12), "{:?}", partly.directions);
-        }
-        // Texture of one direction only: along it motion is as uncertain as the search range.
-        let all = found(&vec![slanted; side * side]);
-        assert!(all.iter().all(|found| found.variances == [4.0, 1.0 / 16.0] && found.directions == [0.5; 3]));
-    }
 }

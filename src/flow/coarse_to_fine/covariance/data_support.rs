@@ -147,27 +147,3 @@ fn signed(is_usable: &[bool]) -> Vec<f64> {
         .map(|(is_usable, (a, b))| if *is_usable { a.min(*b) } else { -a.min(*b) })
         .collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn strips_and_corners_are_continued_from_the_seen_rectangle_and_holes_from_the_nearer_side() {
-        let (width, height) = (41, 33);
-        let mut data = Planes::<f64>::new(width, height, SEEN + 1);
-        for y in 3..height {
-            for x in 5..width {
-                let hole = (10..35).contains(&x) && (15..18).contains(&y);
-                data.line_mut(SEEN, y)[x] = f64::from(u8::from(!hole));
-            }
-        }
-        let is_usable = DataSupport::new(&data, (11, 9));
-        assert_eq!(is_usable.continued_distance(0, 0), 2.0 * 5f64.hypot(3.0));
-        assert_eq!((is_usable.continued_distance(0, 6), is_usable.continued_distance(5, 0)), (10.0, 6.0));
-        assert_eq!(is_usable.continued_distance(5, 4), 4.0);
-        assert_eq!((is_usable.continued_distance(5, 6), is_usable.distances(10, 6)), (0.0, [0.0, 16.0]));
-        let edges = |x, y| is_usable.edges(x, y).map(|edge| (edge.distance, edge.strip));
-        assert_eq!((edges(1, 8), edges(10, 0)), ([(8.0, 10.0), (0.0, 0.0)], [(0.0, 0.0), (0.0, 6.0)]));
-    }
-}

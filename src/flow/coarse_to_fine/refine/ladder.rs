@@ -150,23 +150,4 @@ mod tests {
             assert!((s.variance / (s.sigma * s.sigma) - 0.98).abs() < 0.04, "{} {}", s.sigma, s.variance);
         }
     }
-
-    #[test]
-    fn variance_of_differences_is_the_integral() {
-        let h = |s: f64, w: f64| {
-            let g = (-0.5 * (s * w).powi(2)).exp();
-            1.0 - (1.0 - g).powi(4)
-        };
-        for (a, b) in [(1.5, 2.5), (13.0, 18.0)] {
-            let n = 40_000;
-            let step = 8.0 / a / f64::from(n);
-            let sum: f64 = (0..n)
-                .map(|i| {
-                    let w = (f64::from(i) + 0.5) * step;
-                    (h(a, w) - h(b, w)).powi(2) * w * step / (2.0 * PI)
-                })
-                .sum();
-            assert!((sum / difference_variance(a, b) - 1.0).abs() < 1e-5, "{a} {b}");
-        }
-    }
 }

@@ -93,32 +93,3 @@ fn widen<T: SimdReal>(sites: &[T], slopes: Option<&[T]>, pixels: &mut [T]) {
         *pixel = value;
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::flow::coarse_to_fine::resample::motion_at;
-
-    #[test]
-    fn rows_are_what_single_places_are() {
-        let (width, height) = (10, 8);
-        let mut motion = Planes::<f64>::new(5, 4, 6);
-        for k in 0..6 {
-            for y in 0..4 {
-                for x in 0..5 {
-                    motion.line_mut(k, y)[x] = ((7 * k + 3 * y + 5 * x) as f64).sin();
-                }
-            }
-        }
-        let mut reader = RowReader::new(width);
-        for y in 0..height {
-            reader.read_motion(&motion, y);
-            for x in 0..width {
-                let want = motion_at(&motion, 2.0, x as f64, y as f64);
-                for (k, want) in want.into_iter().enumerate() {
-                    assert!((reader.plane(k)[x] - want).abs() < 1e-12, "plane {k} at ({x}, {y})");
-                }
-            }
-        }
-    }
-}

@@ -61,7 +61,6 @@ impl Background {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::TargetBox;
 
     #[test]
     fn pixels_of_a_shifted_row_come_from_the_nearest_that_there_are() {
@@ -73,25 +72,6 @@ mod tests {
                 assert_eq!(found.of(at), want, "{at} {back}");
             }
             assert!(found.to.is_empty() || found.from().end <= 10, "{back}");
-        }
-    }
-
-    #[test]
-    fn what_comes_into_view_is_seen_and_not_known() {
-        let still = Frame::from_fn(30, 20, |x, y| (3 * x + 7 * y) as f64);
-        let nowhere = TargetBox::about([-1e6; 2], 0.0, 0.0);
-        for by in [[2.0, -1.0], [0.4, 0.0], [-1.7, 2.3]] {
-            let mut background = Background::new(&still, nowhere);
-            let now = Frame::filled(30, 20, -5.0);
-            // Memory that was used before changes nothing.
-            background.spare = vec![1e9; 700];
-            background.moved(by, &now);
-            assert!((background.picture.get(15, 10) - (3.0 * (15.0 - by[0]) + 7.0 * (10.0 - by[1]))).abs() < 1e-9);
-            assert!(background.known.get(15, 10));
-            let new =
-                background.picture.data().iter().zip(background.known.data()).filter(|(value, _)| **value == -5.0);
-            let unknown: Vec<bool> = new.map(|(_, known)| !*known).collect();
-            assert!(!unknown.is_empty() && unknown.iter().all(|unknown| *unknown), "{by:?}");
         }
     }
 }

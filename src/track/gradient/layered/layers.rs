@@ -224,22 +224,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn behind_the_rim_of_the_box_the_first_frame_is_believed_and_goes_on_smoothly_inside() {
-        let frame = Frame::from_fn(60, 50, |x, y| {
-            let inside = (20..33).contains(&x) && (15..28).contains(&y);
-            if inside { 200.0 } else { 60.0 + x as f64 + 0.5 * y as f64 }
-        });
-        let background = Background::new(&frame, TargetBox { x: 19.5, y: 14.5, width: 13.0, height: 13.0 });
-        for (x, y) in [(18, 20), (34, 20), (26, 13), (17, 29)] {
-            assert!(!background.known.get(x, y) && background.picture.get(x, y) == frame.get(x, y), "{x} {y}");
-        }
-        for (x, y) in [(20, 15), (26, 21), (32, 27)] {
-            let ramp = 60.0 + x as f64 + 0.5 * y as f64;
-            assert!((background.picture.get(x, y) - ramp).abs() < 6.0, "{x} {y}: {}", background.picture.get(x, y));
-        }
-    }
-
-    #[test]
     fn the_support_begins_as_the_box_with_its_area() {
         let frame = Frame::from_fn(60, 50, |x, y| (x + 2 * y) as f64);
         let bounds = TargetBox::about([30.25, 20.5], 13.0, 9.5);

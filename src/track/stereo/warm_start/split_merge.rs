@@ -185,7 +185,7 @@ impl Pool {
 #[cfg(test)]
 mod tests {
     use super::super::super::clusters::tests::synthetic_clusters;
-    use super::super::tests::{posterior, with_a_third};
+    use super::super::tests::posterior;
     use super::*;
 
     #[test]
@@ -206,30 +206,6 @@ mod tests {
         assert_eq!(means, [11.0, 11.0, 30.0, 31.0, 21.0, 40.0]);
         // Adjacent blocks are one object.
         assert!(!result([14, 10, 30]).0);
-    }
-
-    #[test]
-    fn pieces_of_a_surface_make_room_where_no_component_is_idle() {
-        let strip = |x: u16| (0..240).map(move |i| ([x + i % 12, 40 + i / 12 % 5, 30], 0));
-        let block = |at: [u16; 3]| (0..45).map(move |i| ([at[0] + i % 3, at[1] + i / 3 % 3, at[2]], 0));
-        // A wall held by two components, and a third component with two small objects.
-        let cells: Vec<_> = strip(10).chain(strip(22)).chain(block([10, 10, 40])).chain(block([40, 20, 50])).collect();
-        let voxels = synthetic_clusters(&cells, 1).voxels;
-        let (values, weights) = (voxels.places(), voxels.weights());
-        let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
-        let mut three = with_a_third();
-        three.means = vec![15.5, 42.0, 30.0, 27.5, 42.0, 30.0, 26.0, 16.0, 45.0];
-        three.scale_inverses = [60.0 * 12.0, 60.0 * 12.0, 60.0 * 60.0]
-            .iter()
-            .flat_map(|&s| [s, 0.0, 0.0, 0.0, s, 0.0, 0.0, 0.0, s / 12.0])
-            .collect();
-        three.scale_inverses[26] = 60.0 * 25.0;
-        assert!(split_and_merge(&mut three, &voxels, &points).unwrap());
-        let labels = three.labels(&points).unwrap();
-        let of = |x: u16, y: u16| labels[voxels.cells.iter().position(|c| c[..2] == [x, y]).unwrap()];
-        assert_eq!(of(10, 40), of(33, 44));
-        let three_things = [of(10, 40), of(11, 11), of(41, 21)];
-        assert_eq!(three_things.iter().collect::<std::collections::BTreeSet<_>>().len(), 3);
     }
 
     #[test]
@@ -255,21 +231,5 @@ mod tests {
         assert_eq!(result(34, 30), (true, 1));
         assert_eq!(result(34, 32), (false, 2));
         assert_eq!(result(35, 30), (false, 2));
-    }
-
-    #[test]
-    fn parts_for_which_there_is_no_component_stay_where_they_are() {
-        let block = |at: [u16; 3]| (0..45).map(move |i| ([at[0] + i % 3, at[1] + i / 3 % 3, at[2]], 0));
-        // Two objects in one component, and a third as far from them as they are from each other.
-        let cells: Vec<_> = block([10, 10, 30]).chain(block([30, 20, 40])).chain(block([60, 50, 10])).collect();
-        let voxels = synthetic_clusters(&cells, 1).voxels;
-        let (values, weights) = (voxels.places(), voxels.weights());
-        let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
-        let mut two = posterior();
-        two.means = vec![20.0, 16.0, 35.0, 61.0, 51.0, 10.0];
-        (0..3).for_each(|i| two.scale_inverses[4 * i] = 60.0 * 40.0);
-        let before = two.clone();
-        assert!(!split_and_merge(&mut two, &voxels, &points).unwrap());
-        assert_eq!(two, before);
     }
 }

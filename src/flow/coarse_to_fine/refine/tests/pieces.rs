@@ -1,9 +1,7 @@
 //! Each piece against the plainest form of its definition, in double precision.
 
 use super::*;
-use crate::flow::coarse_to_fine::refine::choose::Use;
-use crate::flow::coarse_to_fine::refine::ladder::{Scale, Taps, difference_variance};
-use crate::flow::coarse_to_fine::refine::regional_means::Layout;
+use crate::flow::coarse_to_fine::refine::ladder::Scale;
 
 const WIDTH: usize = 37;
 const HEIGHT: usize = 26;
@@ -125,120 +123,6 @@ fn grids_grow_back_without_bending_cubics() {
     let fine = upsample::grow(Level::detect(), &PlanePool::default(), &coarse, 2, &Field::new(39, 28, 1));
     for (x, y) in (0..39).flat_map(|x| (0..28).map(move |y| (x, y))) {
         assert!((fine.at(0, x, y) - cubic(x as f64, y as f64)).abs() < 1e-11, "{x} {y}");
-    }
-}
-
-#[test]
-fn choices_follow_the_formulas() {
-    let options = seven();
-    let ladder = Ladder::<f64>::new(options.ladder, SITE_SPACING);
-    let layout = Layout::new(&seven());
-    let mut means = Planes::<f64>::new(9, 1, layout.count());
-    let roots = |l: usize, x: usize| 0.02 + 0.02 * x as f64 - 0.002 * l as f64;
-    for x in 0..9 {
-        for (k, value) in [(0, 50.0), (1, 10.0), (2, 80.0), (3, 0.4)] {
-            means.line_mut(k, 0)[x] = value;
-        }
-        for l in 0..6 {
-            means.line_mut(Layout::change(l), 0)[x] = roots(l, x);
-            means.line_mut(layout.calm(l), 0)[x] = 1.2 / roots(l, x);
-        }
-        (0..7).for_each(|l| means.line_mut(layout.misfit(l), 0)[x] = 2.0 + l as f64);
-    }
-    let choice = choose::choose(Level::detect(), &PlanePool::default(), &options, &ladder, &means);
-    let order = choice.order;
-    let a = 0.4f64.powi(4) * 130.0 / (4000.0 - 100.0 + 1e-6);
-    for x in 0..9 {
-        assert!((choice.planes.at(order.density(), x, 0) / a - 1.0).abs() < 1e-12);
-        // Change from the third window to the fourth, over that of white noise.
-        let max_unrest = roots(2, x).powi(4) / (difference_variance(options.ladder[2], options.ladder[3]) * a);
-        let slopes = 4.0 * (0.8 * max_unrest).clamp(1.0, 3.1);
-        for (of, kappa, root) in [(Use::Flow, 7.0, 1.0), (Use::Slopes, slopes, 1.0), (Use::Edges, 6.0, 1.0 / 1.2)] {
-            let (mut accepted, mut weights) = (1.0, Vec::new());
-            for l in 0..7 {
-                let next = if l == 6 {
-                    0.0
-                } else {
-                    let d = difference_variance(options.ladder[l], options.ladder[l + 1]);
-                    let ratio = (roots(l, x) * root).powi(4) / (d * a);
-                    accepted / (1.0 + (ratio / kappa).powi(4))
-                };
-                weights.push((accepted - next - 1e-2f64).max(0.0));
-                accepted = next;
-            }
-            let sum: f64 = weights.iter().sum();
-            let (mut sigma, mut coarser) = (0.0, [0.0; 2]);
-            for (l, weight) in weights.iter().enumerate() {
-                assert!((choice.planes.at(order.weight(of, l), x, 0) - weight / sum).abs() < 1e-12, "{x} {l}");
-                if of == Use::Flow {
-                    let misfit = weight / sum * (2.0 + l as f64).powi(4);
-                    assert!((choice.planes.at(order.misfit(l), x, 0) - misfit).abs() < 1e-9);
-                }
-                sigma += weight / sum * options.ladder[l];
-                coarser[..ladder.scales[l].octave].iter_mut().for_each(|c| *c += weight / sum);
-            }
-            assert!((choice.planes.at(order.sigma(of), x, 0) - sigma).abs() < 1e-12);
-            for (octave, want) in coarser.into_iter().enumerate() {
-                assert!((choice.planes.at(order.coarser(of, octave), x, 0) - want).abs() < 1e-12);
-            }
-        }
-    }
-    // The ladder was climbed to different heights.
-    assert!(
-        choice.planes.at(order.sigma(Use::Flow), 0, 0) > 10.0 && choice.planes.at(order.sigma(Use::Flow), 8, 0) < 2.5
-    );
-}
-
-#[test]
-fn regional_levels_are_power_means() {
-    let (options, level) = (seven(), Level::detect());
-    let motion = field::<f64>(WIDTH, HEIGHT, rough);
-    let data = {
-        let mut data = statistics::<f64>(WIDTH, HEIGHT, 1.0);
-        (0..HEIGHT).for_each(|y| (0..WIDTH).for_each(|x| data.line_mut(ENERGY, y)[x] = 1.0 + (x * y % 7) as f64));
-        data
-    };
-    let (ladder, grids) = finest(&motion);
-    let fits: Vec<_> =
-        ladder.scales.iter().map(|s| fit::fits(level, &PlanePool::default(), &grids[s.octave], s)).collect();
-    let samples = ladder.scales.iter().zip(&fits);
-    let samples = samples
-        .map(|(s, f)| fit::samples(level, &PlanePool::default(), f, s, if s.octave == 0 { 2 } else { 1 }))
-        .collect();
-    let fitted = Fitted { fits: &fits, samples };
-    let means = regional_means::regional_means(level, &PlanePool::default(), &options, &ladder, &fitted, &data);
-    let (half_width, half_height) = (WIDTH.div_ceil(2), HEIGHT.div_ceil(2));
-    let mean = |sigma: f64, x: usize, y: usize, f: &dyn Fn(usize, usize) -> f64| {
-        let taps = Taps::<f64>::gaussian(sigma / 4.0, 1.0);
-        let radius = taps.radius() as isize;
-        let mirror = |i: isize, n: usize| {
-            let m = i.rem_euclid(2 * (n as isize - 1));
-            m.min(2 * (n as isize - 1) - m) as usize
-        };
-        let mut sum = 0.0;
-        for j in -radius..=radius {
-            for i in -radius..=radius {
-                let g = taps.taps[i.unsigned_abs()][0] * taps.taps[j.unsigned_abs()][0];
-                sum += g * f(mirror(2 * x as isize + i, half_width), mirror(2 * y as isize + j, half_height));
-            }
-        }
-        sum
-    };
-    let root = |v: f64| (v + 1e-12).powf(0.25);
-    let layout = Layout::new(&seven());
-    for (x, y) in [(0, 0), (4, 3), (9, 6)] {
-        let want = mean(8.0, x, y, &|i, j| root(data.at(ENERGY, 2 * i, 2 * j)));
-        assert!((means.at(Layout::ENERGY, x, y) - want).abs() < 1e-10);
-        let change = |i: usize, j: usize| {
-            let at = |l: usize, k: usize| fitted.samples[l].at(k, i, j);
-            (at(1, 0) - at(2, 0)).powi(2) + (at(1, 1) - at(2, 1)).powi(2)
-        };
-        let want = mean(20.0, x, y, &|i, j| root(change(i, j)));
-        assert!((means.at(Layout::change(1), x, y) - want).abs() < 1e-10);
-        let want = mean(20.0, x, y, &|i, j| 1.0 / root(change(i, j)));
-        assert!((means.at(layout.calm(1), x, y) - want).abs() < 1e-9);
-        let want = mean(14.0, x, y, &|i, j| 1.0 / root(fitted.fits[0].at(6, 2 * i, 2 * j)));
-        assert!((means.at(layout.misfit(0), x, y) - want).abs() < 1e-9);
     }
 }
 
