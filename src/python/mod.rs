@@ -27,6 +27,7 @@ mod particle_track;
 mod points;
 mod progress;
 #[cfg(feature = "reference")]
+#[path = "../../benchmarks/rivals/gradient_reference/binding.rs"]
 mod reference_track;
 mod scenes;
 mod segment;
