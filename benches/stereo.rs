@@ -17,7 +17,7 @@ use std::hint::black_box;
 use std::time::Duration;
 
 const SIZE: (usize, usize) = (640, 480);
-/// Steps of the film, which then runs backwards.
+/// Steps of the sequence, which then runs backwards.
 const STEPS: usize = 8;
 
 /// Three walls of soft cells, near ones before far ones, each with its own disparity and motion.
@@ -54,7 +54,7 @@ impl Scene {
         })
     }
 
-    fn film(&self) -> Vec<[Frame<f32>; 2]> {
+    fn sequence(&self) -> Vec<[Frame<f32>; 2]> {
         (0..STEPS).map(|t| [self.view(t, 0.0), self.view(t, 1.0)]).collect()
     }
 }
@@ -64,7 +64,7 @@ fn threads(count: usize) -> Threads {
 }
 
 fn matching(criterion: &mut Criterion) {
-    let [left, right] = &Scene::new().film()[0];
+    let [left, right] = &Scene::new().sequence()[0];
     let mut group = criterion.benchmark_group("matching");
     group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
     for count in [1, 2] {
@@ -92,7 +92,7 @@ fn matching(criterion: &mut Criterion) {
 }
 
 fn tracking(criterion: &mut Criterion) {
-    let film = Scene::new().film();
+    let sequence = Scene::new().sequence();
     let mut group = criterion.benchmark_group("stereo tracker, a step");
     group.sample_size(10).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(3));
     for count in [1, 2] {
@@ -103,7 +103,7 @@ fn tracking(criterion: &mut Criterion) {
                 bencher.iter(|| {
                     // There and back again: nothing jumps.
                     let place = tracker.steps() % (2 * STEPS - 2);
-                    let [left, right] = &film[if place < STEPS { place } else { 2 * STEPS - 2 - place }];
+                    let [left, right] = &sequence[if place < STEPS { place } else { 2 * STEPS - 2 - place }];
                     black_box(tracker.update(left, right).expect("views that fit"))
                 });
             });

@@ -23,7 +23,7 @@ def rows() -> dict[str, list[float]]:
     for name in SCENES:
         for seed in SEEDS:
             scene = replace(scenes.SCENES[name](), seed=seed, steps=2)
-            for shown in scene.film():
+            for shown in scene.sequence():
                 begun = time.process_time()
                 result = jacoflow.stereo.edge_disparity(
                     shown.left, shown.right, disparity_range=scene.disparity_range, threads=1

@@ -182,9 +182,9 @@ class Scene:
     noise: float = 2.0
     """Standard deviation, grey levels."""
 
-    def film(self, times: Sequence[int] | None = None) -> list[Step]:
+    def sequence(self, times: Sequence[int] | None = None) -> list[Step]:
         """Every step, or some: those have the same textures, but other noise than they have in the whole
-        film."""
+        sequence."""
         rng = np.random.default_rng(self.seed)
         width, height = self.size
         textures = [layer.texture(rng, height, width) for layer in self.layers]

@@ -41,8 +41,8 @@ Named = tuple[str, Pair]
 
 def scene_pairs(scene: Scene) -> list[Pair]:
     """The steps of a scene that are averaged over."""
-    film = scene.film()
-    steps = [film[t] for t in STEPS[scene.name]]
+    sequence = scene.sequence()
+    steps = [sequence[t] for t in STEPS[scene.name]]
     return [
         Pair(s.left, s.right, s.disparity, s.visible, scene.disparity_range, scene.row_offset) for s in steps
     ]

@@ -44,9 +44,9 @@ def led_to(before: NDArray[np.floating], shown: stereo_scenes.Step) -> NDArray[n
 def prior_row(scene: stereo_scenes.Scene, method: str, with_prior: bool) -> Row:
     """Quality and time of matching, with and without what the step before says."""
     found, counts, times = None, [], []
-    film = scene.film()
-    for t, shown in enumerate(film):
-        prior = led_to(found, film[t - 1]) if with_prior and found is not None else None
+    sequence = scene.sequence()
+    for t, shown in enumerate(sequence):
+        prior = led_to(found, sequence[t - 1]) if with_prior and found is not None else None
         begun = time.perf_counter()
         found = jacoflow.stereo.edge_disparity(
             shown.left,

@@ -78,12 +78,12 @@ class Cost:
 
 
 def follow(
-    scene: stereo_scenes.Scene, film: Sequence[stereo_scenes.Step], tracker: StereoTracker, from_truth: bool
+    scene: stereo_scenes.Scene, sequence: Sequence[stereo_scenes.Step], tracker: StereoTracker, from_truth: bool
 ) -> tuple[Scores, Cost]:
     """Scores of a sequence, and the time of a step, the median."""
     clusterings, costs, rounds = [], [], []
     rng = np.random.default_rng(scene.seed)
-    for shown in film:
+    for shown in sequence:
         disparity = edges_of_truth(shown, rng) if from_truth else None
         wall, cpu = time.perf_counter(), time.process_time()
         step = (
@@ -96,7 +96,7 @@ def follow(
         clusterings.append(Clustering(step.rows, step.cols, step.cluster_of_pixel))
     nodes = {key: node_of(cluster) for key, cluster in tracker.graph.nodes.items()}
     arcs = {(t, start, end): sum(shares) for ((t, start), (_, end)), shares in tracker.graph.arcs.items()}
-    truths = [Truth(shown.label, shown.motion) for shown in film]
+    truths = [Truth(shown.label, shown.motion) for shown in sequence]
     return Scores(truths, clusterings, Graph(nodes, arcs)), Cost(
         *map(float, np.median(costs, axis=0)), (float(rounds[0]), float(np.mean(rounds[1:])))
     )
@@ -120,14 +120,14 @@ def edges_of_truth(shown: stereo_scenes.Step, rng: np.random.Generator) -> NDArr
     )
 
 
-def films(
+def sequences(
     scene: stereo_scenes.Scene, mode: str, textures: int, starts: int, from_truth: bool
 ) -> list[list[tuple[Scores, Cost]]]:
     """Each texture from each start."""
     disparity_range, components = scene.disparity_range, 16 if mode == "improved" else 12
     out = []
     for texture in range(textures):
-        film = replace(scene, seed=scene.seed + 20 * texture).film()
+        sequence = replace(scene, seed=scene.seed + 20 * texture).sequence()
         trackers = [
             StereoTracker(
                 mode,
@@ -137,13 +137,13 @@ def films(
             )
             for start in range(starts)
         ]
-        out.append([follow(scene, film, tracker, from_truth) for tracker in trackers])
+        out.append([follow(scene, sequence, tracker, from_truth) for tracker in trackers])
     return out
 
 
 def of_object(label: int, textures: Sequence[Sequence[Scores]], steps: int, grouping: bool) -> Row:
     """How one object was found and followed."""
-    scores = [score for films in textures for score in films]
+    scores = [score for sequences in textures for score in sequences]
     hidden = scores[0].first_hidden(label)
     row: Row = {f"recall {label}": float(np.mean([score.recall(label) for score in scores]))}
     lasting = {
@@ -155,7 +155,7 @@ def of_object(label: int, textures: Sequence[Sequence[Scores]], steps: int, grou
         counts = [kept(score, label) for score in scores]
         row[f"{what} {label}"] = f"{min(counts)}/{most} ({np.mean(counts):.1f})"
     row[f"kept {label}"] = " ".join(
-        f"{np.mean([score.id_share(label) for score in films]):.2f}" for films in textures
+        f"{np.mean([score.id_share(label) for score in sequences]):.2f}" for sequences in textures
     )
     back = [score.recognised(label) for score in scores]
     if None not in back:
@@ -190,13 +190,13 @@ def of_motion(
 def scored(scene: stereo_scenes.Scene, mode: str, seeds: int, starts: int, from_truth: bool) -> Row:
     """One row of the table."""
     labels = [int(label) for label in sorted({layer.label for layer in scene.layers} - {0})]
-    followed = films(scene, mode, seeds, starts, from_truth)
-    textures = [[score for score, _ in films] for films in followed]
-    scores = [score for films in textures for score in films]
+    followed = sequences(scene, mode, seeds, starts, from_truth)
+    textures = [[score for score, _ in sequences] for sequences in followed]
+    scores = [score for sequences in textures for score in sequences]
     row: Row = {
         "scene": scene.name,
         "mode": mode,
-        "films": len(scores),
+        "sequences": len(scores),
         "purity": float(np.mean([score.purity() for score in scores])),
     }
     for label in labels:
@@ -206,7 +206,7 @@ def scored(scene: stereo_scenes.Scene, mode: str, seeds: int, starts: int, from_
     if mode == "improved":
         row["groups"] = float(np.mean([score.groups() for score in scores]))
     row["short tracks"] = float(np.mean([score.short_tracks() for score in scores]))
-    costs = [cost for films in followed for _, cost in films]
+    costs = [cost for sequences in followed for _, cost in sequences]
     row["ms a step"] = 1e3 * float(np.median([cost.wall for cost in costs]))
     row["ms, all threads"] = 1e3 * float(np.median([cost.cpu for cost in costs]))
     row["rounds, first step / later"] = " / ".join(

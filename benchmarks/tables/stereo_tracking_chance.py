@@ -32,7 +32,7 @@ HISTORY = 3
 def scored(scene: Scene, seed: int) -> Scores:
     """What the tracker makes of a sequence."""
     return follow(
-        scene, scene.film(), StereoTracker(disparity_range=scene.disparity_range, random_state=seed), False
+        scene, scene.sequence(), StereoTracker(disparity_range=scene.disparity_range, random_state=seed), False
     )[0]
 
 
@@ -45,10 +45,10 @@ def comings_back(scores: Scores, scene: Scene) -> dict[int, bool]:
     return {label: recognised for label, recognised in told.items() if recognised is not None}
 
 
-def row(kind: str, films: int) -> Row:
+def row(kind: str, sequences: int) -> Row:
     """One row of the table."""
     back, kept, paths, recalls, purities = [], [], [], [], []
-    for seed in range(films):
+    for seed in range(sequences):
         scene = KINDS[kind](seed)
         scores = scored(scene, seed)
         back += list(comings_back(scores, scene).values())
@@ -61,17 +61,17 @@ def row(kind: str, films: int) -> Row:
         name: float(np.mean(values))
         for name, values in {"purity": purities, "recall": recalls, "path": paths, "kept": kept}.items()
     }
-    return {"films": kind, "number": films, **means, "recognised": f"{sum(back)} of {len(back)}"}
+    return {"sequences": kind, "number": sequences, **means, "recognised": f"{sum(back)} of {len(back)}"}
 
 
-def table(films: int) -> list[Row]:
-    """One row for each kind of films."""
-    return [row(kind, films) for kind in KINDS]
+def table(sequences: int) -> list[Row]:
+    """One row for each kind of sequences."""
+    return [row(kind, sequences) for kind in KINDS]
 
 
 TABLES = {
     "chance": report.Table(
-        "Stereo tracking, films by chance", lambda o: table(report.trials(o, SEQUENCES, 1))
+        "Stereo tracking, sequences by chance", lambda o: table(report.trials(o, SEQUENCES, 1))
     )
 }
 

@@ -125,8 +125,8 @@ fn colour_is_refused_with_the_way_out() {
 #[test]
 fn video_without_ffmpeg_is_a_missing_program() {
     let place = Place::new();
-    fs::write(place.path("film.mp4"), b"\0\0\0\x18ftypmp42").unwrap();
-    let output = place.command(&["flow", "film.mp4", "-o", "out"]).env("PATH", "").output().unwrap();
+    fs::write(place.path("sequence.mp4"), b"\0\0\0\x18ftypmp42").unwrap();
+    let output = place.command(&["flow", "sequence.mp4", "-o", "out"]).env("PATH", "").output().unwrap();
     let words = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(3), "{words}");
     assert!(words.contains("ffmpeg"), "{words}");

@@ -69,9 +69,9 @@ fn boxes_are_followed_into_every_kind_of_file() {
     let number = |name: &str| last[name].parse::<f64>().unwrap();
     assert!((1.0..=400.0).contains(&number("effective_sample_size")), "{last:?}");
     assert!((0.0..=1.0).contains(&number("similarity")) && number("n_tracks") >= 0.0, "{last:?}");
-    let mut film = open_colour(&place.path("out.y4m").to_string_lossy(), &OpenOptions::default()).unwrap();
-    assert_eq!((film.next_frame().unwrap().unwrap().size(), film.frame_rate()), (scene.size(), Some(25.0)));
-    assert_eq!(film.skip(10).unwrap(), 7);
+    let mut sequence = open_colour(&place.path("out.y4m").to_string_lossy(), &OpenOptions::default()).unwrap();
+    assert_eq!((sequence.next_frame().unwrap().unwrap().size(), sequence.frame_rate()), (scene.size(), Some(25.0)));
+    assert_eq!(sequence.skip(10).unwrap(), 7);
     assert_eq!(place.names("maps").len(), 8);
     let map = read_image(place.path("maps/foreground_000007.png"), Colour::Error).unwrap();
     assert_eq!((map.size(), map.dtype()), (scene.size(), "uint8"));

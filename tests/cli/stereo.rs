@@ -28,7 +28,7 @@ fn views(index: usize) -> [Vec<u8>; 2] {
     [200, 200 + disparity(index)].map(|from| (0..WIDTH * HEIGHT).map(|i| cell(i % WIDTH + from, i / WIDTH)).collect())
 }
 
-/// The beginning of a film.
+/// The beginning of a sequence.
 pub fn header(w: usize, h: usize) -> Vec<u8> {
     format!("YUV4MPEG2 W{w} H{h} F25:1 Ip A1:1 Cmono\n").into_bytes()
 }
@@ -43,18 +43,18 @@ pub fn recorded_as(pairs: usize, views: impl Fn(usize) -> [Vec<u8>; 2]) -> Place
     let (mut beside, mut above) = (header(2 * WIDTH, HEIGHT), header(WIDTH, 2 * HEIGHT));
     for (side, folder) in ["left", "right"].into_iter().enumerate() {
         fs::create_dir(place.path(folder)).unwrap();
-        let mut film = header(WIDTH, HEIGHT);
+        let mut sequence = header(WIDTH, HEIGHT);
         for index in 0..pairs {
             let bytes = [format!("P5\n{WIDTH} {HEIGHT}\n255\n").into_bytes(), views(index)[side].clone()].concat();
             fs::write(place.path(folder).join(format!("{index}.pgm")), bytes).unwrap();
-            film.extend(b"FRAME\n".iter().chain(&views(index)[side]));
+            sequence.extend(b"FRAME\n".iter().chain(&views(index)[side]));
         }
-        fs::write(place.path(&format!("{folder}.y4m")), film).unwrap();
+        fs::write(place.path(&format!("{folder}.y4m")), sequence).unwrap();
     }
     for index in 0..pairs {
         let [left, right] = views(index);
-        for film in [&mut beside, &mut above] {
-            film.extend(b"FRAME\n");
+        for sequence in [&mut beside, &mut above] {
+            sequence.extend(b"FRAME\n");
         }
         for (a, b) in left.chunks(WIDTH).zip(right.chunks(WIDTH)) {
             beside.extend([a, b].concat());
@@ -118,21 +118,21 @@ fn squeezed(view: &[u8], wide: bool) -> Vec<u8> {
 }
 
 #[test]
-fn squeezed_films_have_the_disparities_of_whole_ones() {
+fn squeezed_sequences_have_the_disparities_of_whole_ones() {
     let place = Place::new();
     for (name, wide) in [("half-side-by-side", true), ("half-top-bottom", false)] {
-        let mut film = header(WIDTH, HEIGHT);
+        let mut sequence = header(WIDTH, HEIGHT);
         for index in 0..2 {
-            film.extend(b"FRAME\n");
+            sequence.extend(b"FRAME\n");
             let [left, right] = views(index).map(|view| squeezed(&view, wide));
             if wide {
-                film.extend(left.chunks(WIDTH / 2).zip(right.chunks(WIDTH / 2)).flat_map(|(a, b)| [a, b].concat()));
+                sequence.extend(left.chunks(WIDTH / 2).zip(right.chunks(WIDTH / 2)).flat_map(|(a, b)| [a, b].concat()));
             } else {
-                film.extend([left, right].concat());
+                sequence.extend([left, right].concat());
             }
         }
-        fs::write(place.path("film.y4m"), film).unwrap();
-        place.good(&format!("stereo film.y4m --layout {name} --disparities -8,12 -o {name}"));
+        fs::write(place.path("sequence.y4m"), sequence).unwrap();
+        place.good(&format!("stereo sequence.y4m --layout {name} --disparities -8,12 -o {name}"));
         for index in 0..2 {
             let file = format!("{name}/disparity_{index:06}.npz");
             let found = median(&place, &file, DisparityFormat::Npz);
@@ -141,9 +141,9 @@ fn squeezed_films_have_the_disparities_of_whole_ones() {
     }
 }
 
-/// A film may begin with black, or with a title that both views show alike.
+/// A sequence may begin with black, or with a title that both views show alike.
 #[test]
-fn rows_are_found_whatever_a_film_begins_with() {
+fn rows_are_found_however_a_sequence_begins() {
     let card = |_: usize| -> Vec<u8> {
         let bar = |i: usize| {
             (20..26).contains(&(i / WIDTH)) || (30..50).contains(&(i / WIDTH)) && (i % WIDTH / 6).is_multiple_of(3)

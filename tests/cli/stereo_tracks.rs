@@ -47,7 +47,7 @@ fn every_layout_gives_the_same_tracks() {
 
 #[test]
 fn missing_frames_are_found_by_their_times() {
-    // The views 3 and 5 of a film.
+    // The views 3 and 5 of a sequence.
     let shown: [usize; 6] = [0, 1, 2, 4, 6, 7];
     let place = recorded_as(6, |index| moving(shown[index]));
     let lines = shown.map(|frame| format!("{},further columns", 7.0 + 0.04 * frame as f64));

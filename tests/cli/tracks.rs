@@ -134,28 +134,28 @@ fn pictures_show_the_box_and_may_be_enlarged() {
     place.good(&format!("track s.y4m {BOX} --overlay boxes --force"));
     place.good(&format!("track s.y4m {BOX} --stop 2 --overlay boxes --force"));
     assert_eq!(place.names("boxes"), ["track_000000.png", "track_000001.png"], "nothing of the longer run is left");
-    // A film instead, which is not replaced unasked; what is in it, the writer's own tests read back.
+    // A sequence instead, which is not replaced unasked; what is in it, the writer's own tests read back.
     let before = std::fs::read(place.path("s.y4m")).unwrap();
     let onto_itself = place.line(&format!("track s.y4m {BOX} --overlay ./s.y4m --force"));
     assert!(onto_itself.code == 2 && onto_itself.err.contains("overlay"), "{}", onto_itself.err);
     assert_eq!(std::fs::read(place.path("s.y4m")).unwrap(), before);
-    let film = format!("track s.y4m {BOX} --overlay film.y4m --enlarge 2");
-    place.good(&film);
-    let again = place.line(&film);
+    let sequence = format!("track s.y4m {BOX} --overlay sequence.y4m --enlarge 2");
+    place.good(&sequence);
+    let again = place.line(&sequence);
     assert!(again.code == 2 && again.err.contains("overlay"), "{}", again.err);
-    place.good(&format!("{film} --force"));
-    assert!(std::fs::read(place.path("film.y4m")).unwrap().starts_with(b"YUV4MPEG2 W"));
+    place.good(&format!("{sequence} --force"));
+    assert!(std::fs::read(place.path("sequence.y4m")).unwrap().starts_with(b"YUV4MPEG2 W"));
 }
 
 #[test]
-fn a_film_may_lie_in_the_new_folder_of_the_texts() {
+fn a_sequence_may_lie_in_the_new_folder_of_the_texts() {
     let place = recorded(3);
-    place.good(&format!("track s.y4m {BOX} -o new/ --overlay new/film.y4m"));
-    assert_eq!(place.names("new"), ["film.y4m", "tracks.csv"]);
+    place.good(&format!("track s.y4m {BOX} -o new/ --overlay new/sequence.y4m"));
+    assert_eq!(place.names("new"), ["sequence.y4m", "tracks.csv"]);
     // What is in the way is still named, and other folders are not made.
-    let again = place.line(&format!("track s.y4m {BOX} -o new/ --format mot --overlay new/film.y4m"));
+    let again = place.line(&format!("track s.y4m {BOX} -o new/ --format mot --overlay new/sequence.y4m"));
     assert!(again.code == 2 && again.err.contains("overlay"), "{}", again.err);
-    let other = place.line(&format!("track s.y4m {BOX} -o new/ --format mot --overlay other/film.y4m"));
+    let other = place.line(&format!("track s.y4m {BOX} -o new/ --format mot --overlay other/sequence.y4m"));
     assert!(other.code != 0 && other.err.contains("other"), "{}", other.err);
     assert!(!place.path("other").exists());
 }
@@ -181,8 +181,8 @@ fn mistakes_are_named_and_leave_nothing() {
         ("track s.y4m -o - --json", &["output", "--json"]),
         ("track s.y4m -o old.csv", &["output", "--force"]),
         ("track s.y4m --overlay old.csv", &["overlay", "folder"]),
-        ("track s.y4m --overlay film.mp4", &["overlay", "*.y4m", "film.mp4/"]),
-        ("track s.y4m --overlay film.mp4 --force", &["overlay", "*.y4m"]),
+        ("track s.y4m --overlay sequence.mp4", &["overlay", "*.y4m", "sequence.mp4/"]),
+        ("track s.y4m --overlay sequence.mp4 --force", &["overlay", "*.y4m"]),
         ("track s.y4m --overlay -", &["overlay", "*.y4m", "standard output"]),
         ("track s.y4m --enlarge 2", &["--overlay"]),
         ("track s.y4m --stop 1 --json", &["frames", "at least 2"]),
@@ -235,9 +235,9 @@ fn an_interrupted_run_leaves_no_half_file() {
 }
 
 #[test]
-fn an_interrupted_film_is_told_by_the_name_that_it_has() {
+fn an_interrupted_sequence_is_reported_by_the_name_that_it_has() {
     let place = Place::new();
-    let line = format!("track - {BOX} --overlay film.y4m -o - --format mot");
+    let line = format!("track - {BOX} --overlay sequence.y4m -o - --format mot");
     let mut command = place.command(&line.split_whitespace().collect::<Vec<_>>());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
@@ -254,8 +254,8 @@ fn an_interrupted_film_is_told_by_the_name_that_it_has() {
     drop(pipe);
     let output = child.wait_with_output().unwrap();
     let words = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(place.names("."), ["film.partial.y4m"]);
-    assert!(!words.contains("film.y4m"), "{words}");
+    assert_eq!(place.names("."), ["sequence.partial.y4m"]);
+    assert!(!words.contains("sequence.y4m"), "{words}");
 }
 
 #[cfg(target_os = "linux")]
@@ -270,15 +270,15 @@ fn devices_are_written_and_a_full_one_says_so() {
 }
 
 #[test]
-fn coloured_films_need_luminance() {
+fn coloured_sequences_need_luminance() {
     let place = Place::new();
     let mono = recording(3);
-    let mut film = String::from_utf8(header()).unwrap().replace("Cmono", "C420").into_bytes();
+    let mut sequence = String::from_utf8(header()).unwrap().replace("Cmono", "C420").into_bytes();
     for frame in mono[header().len()..].chunks(6 + WIDTH * HEIGHT) {
-        film.extend_from_slice(frame);
-        film.extend(std::iter::repeat_n(90, WIDTH * HEIGHT / 2));
+        sequence.extend_from_slice(frame);
+        sequence.extend(std::iter::repeat_n(90, WIDTH * HEIGHT / 2));
     }
-    fs::write(place.path("s.y4m"), film).unwrap();
+    fs::write(place.path("s.y4m"), sequence).unwrap();
     let refused = place.line(&format!("track s.y4m {BOX}"));
     assert!(refused.code != 0 && refused.err.contains("--luminance"), "{}", refused.err);
     place.good(&format!("track s.y4m {BOX} --luminance"));

@@ -7,7 +7,7 @@ fn node(step: usize, lane: usize, number: u64) -> ChartNode {
 }
 
 #[test]
-fn long_films_and_nothing_at_all_are_drawn() {
+fn long_sequences_and_nothing_at_all_are_drawn() {
     let long: Vec<_> = (0..50_000).map(|step| node(step, 0, 1)).collect();
     assert!(chart_picture(&long, &[]).width() < 20_000);
     assert_eq!(chart_picture(&[], &[]).width(), 80);

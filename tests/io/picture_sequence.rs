@@ -4,7 +4,7 @@ use jacoflow::image::picture::Picture;
 use jacoflow::io::{OpenOptions, SequenceWriter, open};
 
 #[test]
-fn a_film_is_read_back_and_has_one_size() {
+fn a_sequence_is_read_back_and_has_one_size() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.y4m");
     let mut sequence = SequenceWriter::create(&path, 29.97).unwrap();

@@ -214,9 +214,9 @@ def test_texture_of_one_direction_tells_of_motion_across_it_and_not_along_it(pre
         within = np.maximum(abs(x - 160), abs(y - 120)) < 40
         scene = 128 + 40 * np.where(within, stripes / stripes.std(), blobs / blobs.std())
         u, v = 1.7, -0.9 + 0.5 * seed
-        films = [map_coordinates(scene, [y - k * v, x - k * u], order=3, mode="wrap") for k in range(2 - frames, 2)]
-        film = [np.clip(np.rint(frame + rng.standard_normal(x.shape)), 0, 255).astype(np.uint8) for frame in films]
-        field = jacoflow.estimate(film, method=jacoflow.CoarseToFine(preset=preset))
+        sequences = [map_coordinates(scene, [y - k * v, x - k * u], order=3, mode="wrap") for k in range(2 - frames, 2)]
+        sequence = [np.clip(np.rint(frame + rng.standard_normal(x.shape)), 0, 255).astype(np.uint8) for frame in sequences]
+        field = jacoflow.estimate(sequence, method=jacoflow.CoarseToFine(preset=preset))
         for found, name, truth in ((across, "u", u), (along, "v", v)):
             error, told = (field.value(name) - truth)[area], field.std(name)[area]
             found.append((np.mean(abs(error) < 1.96 * told), np.sqrt(np.mean(error**2)), np.median(told)))

@@ -62,19 +62,19 @@ def in_child(work):
     return answer
 
 
-def film(count=3):
+def sequence(count=3):
     """Frames so large that their work is split between threads."""
     return scenes.Scene("affine", width=320, height=240, random_state=4).frames(count)
 
 
 def field(method="instantaneous", **options):
-    return jacoflow.estimate(film(), method=method, **options)
+    return jacoflow.estimate(sequence(), method=method, **options)
 
 
 def results(threads):
     """A fingerprint of what takes little time."""
     found = field(threads=threads)
-    return digest(jacoflow.smooth(film()[0], 1.5, threads=threads), found.flow, found.jacobian)
+    return digest(jacoflow.smooth(sequence()[0], 1.5, threads=threads), found.flow, found.jacobian)
 
 
 @needs_fork
@@ -118,7 +118,7 @@ def test_a_fork_amid_the_work_of_another_thread():
 
 @needs_fork
 def test_an_estimator_is_carried_on_in_a_child():
-    frames = film(6)
+    frames = sequence(6)
     for make in (lambda: jacoflow.FlowEstimator(method="windowed"), jacoflow.FlowFilter):
         estimator = make()
         for frame in frames[:4]:
@@ -131,13 +131,13 @@ def test_an_estimator_is_carried_on_in_a_child():
 
 
 def tracked():
-    found = track.track(film(8), (100, 80, 60, 50))
+    found = track.track(sequence(8), (100, 80, 60, 50))
     return found.box, found.displacement
 
 
 def stereo_tracked():
     tracker = track.StereoTracker(disparity_range=(-20, 12))
-    for step in stereo_scenes.small().film()[:3]:
+    for step in stereo_scenes.small().sequence()[:3]:
         tracker.update(step.left, step.right)
     return (np.frombuffer(tracker.graph.to_json().encode(), np.uint8),)
 
@@ -150,13 +150,13 @@ def people(mode):
 
 
 def matched(method):
-    step = stereo_scenes.small().film()[0]
+    step = stereo_scenes.small().sequence()[0]
     found = stereo.edge_disparity(step.left, step.right, disparity_range=(-20, 12), row_range=(-2, 2), method=method)
     return found.disparity, found.values
 
 
 def row_offset():
-    step = stereo_scenes.small().film()[0]
+    step = stereo_scenes.small().sequence()[0]
     return (np.array(stereo.estimate_row_offset(step.left, step.right, disparity_range=(-20, 12))),)
 
 
@@ -196,7 +196,7 @@ def scene(carrier):
 
 
 def observable():
-    found = jacoflow.observability(film())
+    found = jacoflow.observability(sequence())
     return (found.condition, found.condition_number)
 
 
@@ -209,7 +209,7 @@ CALLS = {
     "track": tracked,
     **{f"stereo {method}": lambda method=method: matched(method) for method in ("classes", "sgm")},
     "row offset": row_offset,
-    "edge pixels": lambda: stereo.edge_pixels(film()[0]),
+    "edge pixels": lambda: stereo.edge_pixels(sequence()[0]),
     "stereo tracker": stereo_tracked,
     **{f"particle tracker, {mode}": lambda mode=mode: people(mode) for mode in ("improved", "paper")},
     **{f"motion3d {robust}": lambda robust=robust: moved(robust) for robust in (True, False)},

@@ -1,4 +1,4 @@
-"""The stereo tracker: a film whose answer is known, edge cases, the graph there and back."""
+"""The stereo tracker: a sequence whose answer is known, edge cases, the graph there and back."""
 
 import io
 import json
@@ -21,7 +21,7 @@ def cells(seed=1, rows=15, columns=26):
     return (blocks + np.roll(blocks, 1, 0) + np.roll(blocks, 1, 1) + np.roll(blocks, (1, 1), (0, 1))) / 4
 
 
-def film(steps=5):
+def sequence(steps=5):
     """A wall that moves 2 px/step to the right at disparity -4, before it a board that moves 3 px/step to the left at disparity 5: left and right views."""
     wall, board = cells(), cells(2)[:48, :56]
     for t in range(steps):
@@ -33,9 +33,9 @@ def film(steps=5):
 
 
 def followed(mode="improved", **options):
-    """A tracker after the film, and its last step."""
+    """A tracker after the sequence, and its last step."""
     tracker = StereoTracker(mode, n_components=6, **{**SMALL, **options})
-    for left, right in film():
+    for left, right in sequence():
         step = tracker.update(left, right)
     return tracker, step
 
@@ -123,7 +123,7 @@ def test_velocities_are_for_the_unit_of_time():
 def test_a_time_of_one_is_no_time_and_others_are_refused():
     plain, _ = shown_at([0, 1, 2], told=False)
     assert shown_at([0, 1, 2])[0].graph == plain.graph == shown_at([0, 2, 4], speed=1.0, told=False)[0].graph
-    left, right = next(film())
+    left, right = next(sequence())
     tracker = StereoTracker(n_components=4, **SMALL)
     for wrong in (0, -1.0, 5e-324, 1e300, float("nan"), float("inf")):
         with pytest.raises(ValueError, match="dt: "):
@@ -138,12 +138,12 @@ def test_a_time_of_one_is_no_time_and_others_are_refused():
 def test_who_comes_nearer_is_followed_over_missing_frames():
     """The cab of the curved scene, three of ten frames missing: its way over a gap is foreseen."""
     scene = curved()
-    film, kept = scene.film(), [0, 1, 2, 4, 5, 8, 9]
+    sequence, kept = scene.sequence(), [0, 1, 2, 4, 5, 8, 9]
     tracker = StereoTracker()
     for last, now in zip([None, *kept], kept):
-        step = tracker.update(film[now].left, film[now].right, dt=None if last is None else now - last)
+        step = tracker.update(sequence[now].left, sequence[now].right, dt=None if last is None else now - last)
     graph = tracker.graph
-    truths = [Truth(film[now].label, film[now].motion) for now in kept]
+    truths = [Truth(sequence[now].label, sequence[now].motion) for now in kept]
     assert step.clock == 9.0
     for t, truth in enumerate(truths[:-1]):
         cab = max((node for (at, _), node in graph.nodes.items() if at == t and truth.label[tuple(np.rint(node.middle[::-1]).astype(int))] == 1), key=lambda node: node.n_pixels)
@@ -226,14 +226,14 @@ def test_a_written_graph_says_everything_once(part):
         TrackGraph.from_json(json.dumps(graph))
 
 
-def test_a_compressed_film_that_holds_both_views_is_followed(tmp_path):
+def test_a_compressed_sequence_that_holds_both_views_is_followed(tmp_path):
     """As players have it: MPEG-4 of both views side by side, with the losses that go with it."""
     av = pytest.importorskip("av")
-    path = tmp_path / "film.mp4"
+    path = tmp_path / "sequence.mp4"
     with av.open(str(path), "w") as container:
         stream = container.add_stream("mpeg4", rate=25, options={"qscale": "2"})
         stream.width, stream.height, stream.pix_fmt, stream.bit_rate = 320, 120, "yuv420p", 8_000_000
-        for views in film():
+        for views in sequence():
             picture = av.VideoFrame.from_ndarray(np.hstack(views), format="gray").reformat(format="yuv420p")
             container.mux(stream.encode(picture))
         container.mux(stream.encode())
@@ -246,22 +246,22 @@ def test_a_compressed_film_that_holds_both_views_is_followed(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore:row_range")  # Of views of noise.
-def test_the_rows_of_a_film_are_not_those_of_its_title():
+def test_the_rows_of_a_sequence_are_not_those_of_its_title():
     card = np.full((240, 320), 20, np.uint8)
     card[100:104, 60:260] = card[120:150, 80:84] = card[120:150, 200:204] = 230
     noise = [np.random.default_rng(seed).integers(0, 40, card.shape, dtype=np.uint8) for seed in (1, 2)]
-    film = small().film()[:2]
+    sequence = small().sequence()[:2]
     for first in ((card, card), noise, (np.full_like(card, 16),) * 2):
         tracker = StereoTracker(disparity_range=(-20, 12))
         tracker.update(*first)
-        for shown in film:
+        for shown in sequence:
             step = tracker.update(shown.left, shown.right)
             wrong = np.abs(step.values - shown.disparity[step.rows, step.cols]) > 1
             assert len(step.rows) > 4000 and wrong.mean() < 0.04
 
 
 def test_rows_that_nothing_agrees_with_are_warned_of():
-    shown = small().film()[0]
+    shown = small().sequence()[0]
     tracker = StereoTracker(disparity_range=(-20, 12))
     assert tracker.row_offset is None
     with pytest.warns(UserWarning, match="row_range: .* -4 to 4"):
@@ -279,7 +279,7 @@ def edges_at(left, disparity):
 
 
 def test_disparities_outside_of_the_range_are_left_out_and_told():
-    left, _ = next(film())
+    left, _ = next(sequence())
     disparity = edges_at(left, 5)
     near = np.isfinite(disparity)
     disparity[:, 80:][near[:, 80:]] = 60
@@ -296,7 +296,7 @@ def test_disparities_outside_of_the_range_are_left_out_and_told():
 
 @pytest.mark.parametrize("truth", [5.0, 5.45, -3.3])
 def test_depth_is_that_of_the_pixels_and_not_of_their_layers(truth):
-    left, _ = next(film())
+    left, _ = next(sequence())
     camera = StereoCamera(200.0, 0.1, -10.0)
     for given in (truth + np.random.default_rng(3).normal(0, 0.05, left.shape), np.full(left.shape, np.rint(truth))):
         # More components would share out the pixels by their layers.
@@ -361,7 +361,7 @@ def test_what_leaves_the_picture_is_measured_while_half_of_it_is_left(mode):
 @pytest.mark.parametrize("mode", ["improved", "paper"])
 def test_nothing_to_see_is_a_step_without_clusters(mode):
     tracker = StereoTracker(mode, n_components=6, **SMALL)
-    views = list(film())
+    views = list(sequence())
     grey = np.full((120, 160), 90, np.uint8)
     for left, right in [(grey, grey), *views[:3], (grey, grey), *views[4:]]:
         step = tracker.update(left, right)
@@ -373,7 +373,7 @@ def test_nothing_to_see_is_a_step_without_clusters(mode):
 def test_nobody_knows_how_anything_moved_to_or_from_a_pair_of_nothing():
     grey = np.full((120, 160), 90, np.uint8)
     tracker = StereoTracker("paper", n_components=6, **SMALL)
-    views = list(film())
+    views = list(sequence())
     for left, right in [views[0], views[1], (grey, grey), views[3], views[4]]:
         tracker.update(left, right)
     nodes = tracker.graph.nodes
@@ -383,9 +383,9 @@ def test_nobody_knows_how_anything_moved_to_or_from_a_pair_of_nothing():
 
 
 @pytest.mark.parametrize("dark", [0.0, 0.005])
-def test_a_film_of_floats_may_begin_with_black(dark):
+def test_a_sequence_of_floats_may_begin_with_black(dark):
     rng = np.random.default_rng(5)
-    views = [[(view + rng.normal(0, 2, view.shape)).astype(np.float32) for view in pair] for pair in film()]
+    views = [[(view + rng.normal(0, 2, view.shape)).astype(np.float32) for view in pair] for pair in sequence()]
     usual, late = (StereoTracker(n_components=6, **SMALL) for _ in range(2))
     late.update(*(np.float32(dark) * view for view in views[0]))
     for pair in views:
@@ -399,7 +399,7 @@ def test_a_film_of_floats_may_begin_with_black(dark):
 
 def test_a_track_rests_while_nothing_is_seen():
     tracker = StereoTracker(n_components=6, **SMALL)
-    views = list(film())
+    views = list(sequence())
     grey = np.full((120, 160), 90, np.uint8)
     before = [tracker.update(*views[t]) for t in range(3)][-1]
     tracker.update(grey, grey)
@@ -415,7 +415,7 @@ def test_results_do_not_depend_on_threads(mode):
 
 def test_pixels_that_are_not_finite_do_no_harm():
     tracker = StereoTracker(n_components=6, **SMALL)
-    for left, right in film():
+    for left, right in sequence():
         left, right = left.astype(np.float32), right.astype(np.float32)
         left[50:54, 20:24] = np.nan
         right[10, 10] = np.inf
@@ -425,7 +425,7 @@ def test_pixels_that_are_not_finite_do_no_harm():
 
 def test_disparities_from_elsewhere():
     tracker = StereoTracker(n_components=6, **SMALL)
-    for t, (left, _) in enumerate(film()):
+    for t, (left, _) in enumerate(sequence()):
         disparity = np.full(left.shape, np.nan, np.float32)
         edges = np.hypot(*np.gradient(left.astype(float))) > 15
         disparity[edges] = -4
@@ -440,7 +440,7 @@ def test_disparities_from_elsewhere():
 
 def test_views_that_do_not_fit_are_refused_with_both_shapes():
     tracker = StereoTracker(**SMALL)
-    left, right = next(film())
+    left, right = next(sequence())
     with pytest.raises(ValueError, match=r"\(120, 160\).*\(120, 159\)"):
         tracker.update(left, right[:, 1:])
     tracker.update(left, right)
@@ -501,11 +501,11 @@ def test_options_of_another_kind_are_named(option, value):
 
 def test_a_step_that_failed_changes_nothing():
     good, other = StereoTracker(n_components=6, **SMALL), StereoTracker(n_components=6, **SMALL)
-    left, right = next(film())
+    left, right = next(sequence())
     dark = np.full((120, 160), 0.5, np.float32)
     with pytest.raises(ValueError, match="right"):
         other.update(dark, dark[1:])
-    for view in film():
+    for view in sequence():
         good.update(*(each.astype(np.float32) for each in view))
         other.update(*(each.astype(np.float32) for each in view))
         with pytest.raises(ValueError, match="left"):

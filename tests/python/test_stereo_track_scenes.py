@@ -21,21 +21,21 @@ def test_who_is_taken_over_by_a_component_at_its_rim_keeps_its_track(seed, label
     assert scores.id_kept(label) == scores.index_kept(label) == scores.path(label) == 6
 
 
-def scored(scene, mode, film=None, **options):
+def scored(scene, mode, sequence=None, **options):
     tracker = StereoTracker(mode, disparity_range=scene.disparity_range, **options)
-    return follow(scene, film or scene.film(), tracker, False)[0]
+    return follow(scene, sequence or scene.sequence(), tracker, False)[0]
 
 
 @lru_cache(maxsize=1)
-def crossing_film(seed):
+def crossing_sequence(seed):
     """Drawing it takes longer than following it."""
-    return replace(crossing(), seed=seed).film()
+    return replace(crossing(), seed=seed).sequence()
 
 
 @cache
 def crossing_on_paper(seed):
     """Purity, recalls and paths of the paper's mode on a texture of the crossing, means over three starts of the mixture."""
-    each = [scored(crossing(), "paper", crossing_film(seed), random_state=start) for start in range(3)]
+    each = [scored(crossing(), "paper", crossing_sequence(seed), random_state=start) for start in range(3)]
     return np.mean([[scores.purity(), *(scores.recall(label) for label in (1, 2, 3)), *(scores.path(label) for label in (1, 2, 3))] for scores in each], axis=0)
 
 
@@ -62,10 +62,10 @@ def test_the_specifications_figures_on_the_small_scene(mode, purity, recalls, er
 @pytest.mark.parametrize("seed", [3, 23])
 def test_a_pair_that_comes_twice_stands_still_and_changes_no_name(seed):
     """The cart recedes by 3 px of disparity a step: a standstill would be a jump."""
-    film = replace(cart(), seed=seed).film()
+    sequence = replace(cart(), seed=seed).sequence()
     tracker = StereoTracker()
     of_cart = []
-    for shown in [*film[:4], film[3], *film[4:7]]:
+    for shown in [*sequence[:4], sequence[3], *sequence[4:7]]:
         step = tracker.update(shown.left, shown.right)
         indices, counts = np.unique(step.cluster_of_pixel[shown.label[step.rows, step.cols] == 1], return_counts=True)
         of_cart.append(next(cluster for cluster in step.clusters if cluster.index == indices[counts.argmax()]))
@@ -78,13 +78,13 @@ def test_a_pair_that_comes_twice_stands_still_and_changes_no_name(seed):
 @pytest.mark.parametrize("scene", [cart, crossing])
 def test_a_missing_pair_changes_no_name(scene):
     """Nobody is told that twice the time went by: the cart recedes by 6 px of disparity at once, which is a jump but for all of it being seen there."""
-    film = scene().film(range(9))
-    scores = scored(scene(), "improved", [*film[:4], *film[5:]])
+    sequence = scene().sequence(range(9))
+    scores = scored(scene(), "improved", [*sequence[:4], *sequence[5:]])
     assert scores.id_share(1) == 1.0 and scores.id_share(2) == 1.0
 
 
 @pytest.mark.parametrize(("scene", "seeds"), [(crossing_by_chance, (0, 1, 2, 3)), (passing_by_chance, (0, 3, 7))])
-def test_who_was_hidden_is_recognised_in_films_by_chance(scene, seeds):
+def test_who_was_hidden_is_recognised_in_sequences_by_chance(scene, seeds):
     back = []
     for seed in seeds:
         drawn = scene(seed)
@@ -112,8 +112,8 @@ def test_another_exposure_is_no_motion(exposure):
         gain, offset = exposure(t)
         return np.rint(np.clip(gain * view + offset, 0, 255)).astype(np.uint8)
 
-    film = [replace(shown, left=exposed(t, shown.left), right=exposed(t, shown.right)) for t, shown in enumerate(small().film())]
-    scores = scored(small(), "improved", film)
+    sequence = [replace(shown, left=exposed(t, shown.left), right=exposed(t, shown.right)) for t, shown in enumerate(small().sequence())]
+    scores = scored(small(), "improved", sequence)
     assert [scores.id_kept(label) for label in (1, 2)] == [6, 6]
     # Some pieces of the wall have just come to light.
     for label, errors in scores.motion_errors().items():
@@ -124,16 +124,16 @@ def test_another_exposure_is_no_motion(exposure):
 def test_what_drifts_through_layers_of_depth_keeps_its_track(disparity, approach, speed):
     layers = (wall(160, 120, 0, -14, 0, 28), Layer("box", 1, (100, 120), (speed, 0.2), disparity, approach, (36, 50), 14))
     drifting = Scene("drifting", layers, 12, 0.0, 21, (320, 240), (-20, 12))
-    film = drifting.film()
+    sequence = drifting.sequence()
     for start in range(4):
         tracker = StereoTracker(disparity_range=drifting.disparity_range, random_state=start)
-        scores = follow(drifting, film, tracker, False)[0]
+        scores = follow(drifting, sequence, tracker, False)[0]
         assert scores.id_share(1) == 1.0 and scores.recall(1) > 0.98
         assert (np.median(scores.motion_errors("velocity")[1], axis=0) <= (0.02, 0.02, 0.03)).all()
 
 
 def test_who_was_hidden_is_recognised():
-    scores = scored(crossing(), "improved", crossing_film(1))
+    scores = scored(crossing(), "improved", crossing_sequence(1))
     assert crossing_on_paper(1)[0] > 0.9
     assert scores.recognised(2)
     assert scores.purity() >= 0.958
@@ -150,7 +150,7 @@ def test_who_was_hidden_is_recognised():
 
 @pytest.mark.parametrize("seed", CROSSINGS[1:])
 def test_other_textures_of_the_crossing_are_followed_as_well(seed):
-    scores = scored(crossing(), "improved", crossing_film(seed))
+    scores = scored(crossing(), "improved", crossing_sequence(seed))
     assert crossing_on_paper(seed)[0] > 0.9
     assert scores.purity() >= 0.958
     assert [scores.path(label) for label in (1, 2, 3)] == [9, 11, 16] == [scores.id_kept(label) for label in (1, 2, 3)]

@@ -27,7 +27,7 @@ fn said(found: &EdgeDisparity) -> (&[u32], &[u32], &[f32], f64) {
 }
 
 #[test]
-fn whatever_a_film_begins_with_its_rows_are_found() {
+fn rows_are_found_however_a_sequence_begins() {
     for opening in openings() {
         let mut rows = SequenceRows::new(None);
         rows.match_next(&opening[0], &opening[1], &options()).unwrap();

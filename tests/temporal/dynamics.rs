@@ -1,4 +1,4 @@
-//! The affine-flow dynamical system of one pixel (WO2010/098160, (11)), and the filter's steps over one frame.
+//! The affine-flow dynamical system of one pixel (WO2010/098160, (11)), and the filter's steps over a frame.
 
 use jacoflow::math::random::CounterRng;
 use jacoflow::temporal::{FilterForm, FlowFilter, FlowFilterOptions, Transition};

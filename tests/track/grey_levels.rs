@@ -60,7 +60,7 @@ fn grey_levels_are_known_in_the_dark_too() {
 }
 
 #[test]
-fn a_film_that_begins_with_black_has_the_scale_of_what_follows() {
+fn a_sequence_that_begins_with_black_has_the_scale_of_what_follows() {
     let frame =
         |gain: f64| AnyFrame::F32(Frame::from_fn(64, 48, |x, y| (gain * ((7 * x + 13 * y) % 256) as f64) as f32));
     for black in [0.0, 0.005] {

@@ -39,7 +39,7 @@ macro_rules! straight {
     };
 }
 
-/// Two people, whom a calm hand films.
+/// Two people, seen by a steady camera.
 const PEOPLE: TargetSceneKind = TargetSceneKind {
     name: "",
     summary: "",
