@@ -131,12 +131,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn long_values_are_cut() {
-        let long = Error::argument("name", "less", "x".repeat(300)).to_string();
-        assert_eq!(long.len(), "name: expected less, got ".len() + 163);
-    }
-
-    #[test]
     fn huge_and_tiny_numbers_have_an_exponent() {
         for (value, word) in [(1e300, "1e300"), (-2.5e-300, "-2.5e-300"), (0.1, "0.1"), (f64::NAN, "NaN")] {
             assert_eq!(
@@ -145,11 +139,5 @@ mod tests {
             );
         }
         assert_eq!(numbers(&[0.0, -1.5, 1e300, 1e-9]), "(0, -1.5, 1e300, 1e-9)");
-    }
-
-    #[test]
-    fn message_names_argument_expectation_and_value() {
-        let error = Error::argument("stride", "a positive integer", 0);
-        assert_eq!(error.to_string(), "stride: expected a positive integer, got 0");
     }
 }

@@ -199,23 +199,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bands_cover_every_row_once_for_any_thread_count() {
-        for threads in [1, 2, 3] {
-            let mut buffer = vec![0u32; 37 * 5];
-            Threads::new(Some(threads)).unwrap().install(|| {
-                for_each_band(&mut buffer, 5, |band, rows, slice| {
-                    assert_eq!(rows.start, band * BAND_ROWS);
-                    assert_eq!(slice.len(), rows.len() * 5);
-                    for value in slice {
-                        *value += 1;
-                    }
-                });
-            });
-            assert!(buffer.iter().all(|&v| v == 1));
-        }
-    }
-
-    #[test]
     fn large_buffers_outside_every_pool_stay_out_of_the_global_one() {
         let mut named = vec![false; 2 * MAX_SERIAL];
         let own = |name: &str| name.starts_with("jacoflow-");
@@ -248,13 +231,6 @@ mod tests {
     }
 
     #[test]
-    fn a_million_threads_are_not_started() {
-        let processors = std::thread::available_parallelism().unwrap().get();
-        assert_eq!(Threads::new(Some(1_000_000)).unwrap().count(), MAX_PER_PROCESSOR * processors);
-        assert_eq!(Threads::new(Some(1)).unwrap().count(), 1);
-    }
-
-    #[test]
     fn the_environment_is_believed_or_refused_never_ignored() {
         let of = |text: &str| from_environment(Some(text.into()));
         assert_eq!((from_environment(None).unwrap(), of("").unwrap(), of("3").unwrap()), (None, None, Some(3)));
@@ -262,10 +238,5 @@ mod tests {
             let message = of(wrong).unwrap_err().to_string();
             assert!(message.starts_with("JACOFLOW_THREADS: ") && message.contains(wrong), "{message}");
         }
-    }
-
-    #[test]
-    fn zero_threads_are_refused() {
-        assert!(Threads::new(Some(0)).unwrap_err().to_string().contains("threads"));
     }
 }

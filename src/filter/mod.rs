@@ -50,7 +50,7 @@ mod unscented;
 
 pub use extended::ExtendedFilter;
 pub use kalman::KalmanFilter;
-pub(crate) use scalar::update_by_scalar;
+pub use scalar::update_by_scalar;
 pub use sigma_points::SigmaPoints;
 pub use state::GaussianState;
 #[cfg(feature = "python")]

@@ -5,8 +5,10 @@ use jacoflow::flow::{Estimator, EstimatorOptions, Method};
 use jacoflow::types::{FlowField, Frame, MOTION_NAMES};
 
 mod dense;
+mod error;
 mod field;
 mod frame;
+mod parallel;
 mod random;
 mod region;
 mod special;

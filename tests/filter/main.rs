@@ -4,4 +4,5 @@ mod filter;
 mod particle;
 mod particle_resampling;
 mod particle_weights;
+mod scalar;
 mod soundness;

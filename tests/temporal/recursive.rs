@@ -118,7 +118,6 @@ fn the_error_falls_with_the_root_of_the_frames() {
         ("windowed", windowed(), REST, 4.0, 4, -0.44),
         ("windowed", windowed(), SLOW, 6.0, 4, -0.38),
         ("coarse to fine", coarse_to_fine(3), REST, 6.0, 20, -0.4),
-        ("coarse to fine, pairs", coarse_to_fine(2), REST, 6.0, 20, -0.4),
     ] {
         let errors = law(&method, motion, noise, realisations);
         let points: Vec<_> = errors.iter().enumerate().map(|(k, e)| (k as f64 * 2.0_f64.ln(), e.ln())).collect();
