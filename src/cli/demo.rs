@@ -12,7 +12,7 @@ use crate::image::Preprocess;
 use crate::io::{FieldFormat, MemorySource, open_sink};
 use crate::parallel::Threads;
 use crate::pipeline::{
-    Collect, Numbering, OutputPlan, OutputWish, PictureKind, PictureRanges, Pipeline, Sink, is_folder,
+    Collect, FieldSink, Numbering, OutputPlan, OutputWish, PictureKind, PictureRanges, Pipeline, is_folder,
 };
 use crate::synth::{Scene, SceneOptions, Sensor, build, truth};
 use crate::temporal::{FlowStream, StreamPlan};
@@ -90,7 +90,7 @@ impl DemoCommand {
         let stream = FlowStream::new(StreamPlan::new(estimator, Preprocess::default(), None)?)?;
         let mut pipeline = Pipeline::<f32>::new(Box::new(stream))
             .with_numbering(Numbering { rate: Some(RATE), ..Numbering::default() })
-            .with_sinks([Box::new(kept) as Box<dyn Sink<f32>>])
+            .with_sinks([Box::new(kept) as Box<FieldSink<f32>>])
             .with_sinks(plan.sinks(description.to_string(), PictureRanges::default())?);
         let source = Box::new(MemorySource::new(frames)?.with_frame_rate(RATE));
         let mut context =

@@ -7,7 +7,7 @@ use super::progress::Bar;
 use super::report::{Report, print_message};
 use crate::error::{Error, Result};
 use crate::io::FrameSource;
-use crate::pipeline::{Pipeline, Sink, Summary, TableTarget, check_target, is_folder};
+use crate::pipeline::{FieldSink, Pipeline, Summary, TableTarget, check_target, is_folder};
 use crate::simd::SimdReal;
 use crate::temporal::{FlowStream, StreamPlan};
 use serde_json::{Value, json};
@@ -29,7 +29,7 @@ pub struct ReportContext<'a> {
 pub fn run_flow<T: SimdReal>(
     opened: Opened,
     plan: StreamPlan,
-    sinks: Vec<Box<dyn Sink<T>>>,
+    sinks: Vec<Box<FieldSink<T>>>,
     context: ReportContext<'_>,
     watch: &Watch,
 ) -> Result<Report> {

@@ -1,7 +1,7 @@
 //! The loop over frames.
 
 use super::prefetch::Prefetch;
-use super::sink::{Sink, Step, end_all, in_place};
+use super::sink::{FieldSink, Step, end_all, in_place};
 use super::stage::Stage;
 use crate::error::{Error, Result};
 use crate::io::FrameSource;
@@ -75,7 +75,7 @@ impl Summary {
 pub struct Pipeline<T> {
     numbering: Numbering,
     stage: Box<dyn Stage<T>>,
-    sinks: Vec<Box<dyn Sink<T>>>,
+    sinks: Vec<Box<FieldSink<T>>>,
     summary: Summary,
 }
 
@@ -91,7 +91,7 @@ impl<T: SimdReal> Pipeline<T> {
         self
     }
     /// Further receivers of the results.
-    pub fn with_sinks(mut self, sinks: impl IntoIterator<Item = Box<dyn Sink<T>>>) -> Self {
+    pub fn with_sinks(mut self, sinks: impl IntoIterator<Item = Box<FieldSink<T>>>) -> Self {
         self.sinks.extend(sinks);
         self
     }

@@ -60,7 +60,7 @@ fn start(id: u64, frame: usize) -> TargetStart {
 }
 
 /// Every kind of sink in a folder.
-fn into(folder: &Path) -> Vec<Box<dyn ParticleSink>> {
+fn into(folder: &Path) -> Vec<Box<ParticleSink>> {
     vec![
         Box::new(ParticleOverlays::create(folder.join("o"), TrackOverlay::default(), 25.0).unwrap()),
         Box::new(ForegroundMaps::create(folder.join("f"), 25.0).unwrap()),

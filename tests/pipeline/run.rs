@@ -3,7 +3,7 @@
 use jacoflow::error::{Error, Result};
 use jacoflow::io::{FrameSource, MemorySource};
 use jacoflow::parallel::{Progress, Silent};
-use jacoflow::pipeline::{Collect, Ending, Numbering, Output, Pipeline, Sink, Stage, Step};
+use jacoflow::pipeline::{Collect, Ending, FieldSink, Numbering, Output, Pipeline, Sink, Stage, Step};
 use jacoflow::types::{AnyFrame, FieldLayout, FlowField, Frame, SamplingGrid, Status};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -48,7 +48,7 @@ impl Progress for StopAfter {
 #[derive(Clone, Default)]
 struct Ended(Arc<Mutex<Vec<Ending>>>, Arc<AtomicUsize>);
 
-impl Sink<f32> for Ended {
+impl Sink<Step<'_, f32>> for Ended {
     fn accept(&mut self, _step: &Step<'_, f32>) -> Result<()> {
         self.1.fetch_add(1, Ordering::SeqCst);
         Ok(())
@@ -79,7 +79,7 @@ fn fields_are_numbered_as_the_input_and_counted() {
     let fields = kept.handle();
     let numbering = Numbering { start: 10, step: 3, rate: Some(30.0) };
     let mut pipeline =
-        Pipeline::new(Box::new(Means(0))).with_numbering(numbering).with_sinks([Box::new(kept) as Box<dyn Sink<f32>>]);
+        Pipeline::new(Box::new(Means(0))).with_numbering(numbering).with_sinks([Box::new(kept) as Box<FieldSink<f32>>]);
     let frames = (1..=4).map(|v| AnyFrame::U8(Frame::filled(2, 2, v))).collect();
     pipeline.run(Box::new(MemorySource::new(frames).unwrap()), &Silent).unwrap();
     let fields = fields.lock().unwrap();
@@ -100,7 +100,8 @@ fn sinks_learn_how_a_run_ended() {
     ];
     for (sizes, stop, message, ending, accepted) in cases {
         let sink = Ended::default();
-        let mut pipeline = Pipeline::new(Box::new(Means(0))).with_sinks([Box::new(sink.clone()) as Box<dyn Sink<f32>>]);
+        let mut pipeline =
+            Pipeline::new(Box::new(Means(0))).with_sinks([Box::new(sink.clone()) as Box<FieldSink<f32>>]);
         let result = pipeline.run(source(sizes), &StopAfter(stop));
         let told = result.err().map_or(String::new(), |error| error.to_string());
         assert!(told.contains(message) && told.is_empty() == message.is_empty(), "{told}");

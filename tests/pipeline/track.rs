@@ -49,7 +49,7 @@ fn source(levels: &[u16]) -> Box<dyn FrameSource> {
 }
 
 /// Two targets, and these sinks.
-fn begin<'a>(sinks: Vec<Box<dyn TrackSink>>) -> Begin<'a> {
+fn begin<'a>(sinks: Vec<Box<TrackSink>>) -> Begin<'a> {
     Box::new(|_| Ok(Begun { trackers: vec![Walker::at(6.0), Walker::at(12.0)], sinks }))
 }
 
@@ -61,8 +61,8 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 /// Every kind of sink in a folder.
-fn into(folder: &Path) -> Vec<Box<dyn TrackSink>> {
-    let mut sinks: Vec<Box<dyn TrackSink>> =
+fn into(folder: &Path) -> Vec<Box<TrackSink>> {
+    let mut sinks: Vec<Box<TrackSink>> =
         vec![Box::new(Overlays::create(folder.join("o"), TrackOverlay::default(), 25.0).unwrap())];
     for &format in TrackFormat::ALL {
         let target = TableTarget::File(folder.join(format!("t.{}", format.extension())));

@@ -51,9 +51,9 @@ impl TrackCommand {
     }
 
     /// Begins what is written; folders are made.
-    fn sinks(&self, wanted: &[Wanted<TrackFormat>], rate: Option<f64>) -> Result<Vec<Box<dyn TrackSink>>> {
+    fn sinks(&self, wanted: &[Wanted<TrackFormat>], rate: Option<f64>) -> Result<Vec<Box<TrackSink>>> {
         self.output.make_folder()?;
-        let mut sinks: Vec<Box<dyn TrackSink>> = Vec::new();
+        let mut sinks: Vec<Box<TrackSink>> = Vec::new();
         if let Some(path) = &self.output.overlay {
             let drawing = TrackOverlay { enlargement: self.output.enlarge, ..TrackOverlay::default() };
             sinks.push(Box::new(Overlays::create(path, drawing, TrackOutputArguments::frame_rate(rate))?));

@@ -95,10 +95,10 @@ impl TrackCommand {
     }
 
     /// Begins what is written; folders are made.
-    fn particle_sinks(&self, wanted: &[Wanted<TrackFormat>], rate: Option<f64>) -> Result<Vec<Box<dyn ParticleSink>>> {
+    fn particle_sinks(&self, wanted: &[Wanted<TrackFormat>], rate: Option<f64>) -> Result<Vec<Box<ParticleSink>>> {
         self.output.make_folder()?;
         let rate = TrackOutputArguments::frame_rate(rate);
-        let mut sinks: Vec<Box<dyn ParticleSink>> = Vec::new();
+        let mut sinks: Vec<Box<ParticleSink>> = Vec::new();
         if let Some(path) = &self.output.overlay {
             let drawing = TrackOverlay { enlargement: self.output.enlarge, ..TrackOverlay::default() };
             sinks.push(Box::new(ParticleOverlays::create(path, drawing, rate)?));

@@ -1,9 +1,9 @@
 //! Foreground maps as pictures.
 
-use super::{ParticleFrame, ParticleSink};
+use super::ParticleFrame;
 use crate::error::Result;
 use crate::pipeline::album::Album;
-use crate::pipeline::sink::Ending;
+use crate::pipeline::sink::{Ending, Sink};
 use std::path::{Path, PathBuf};
 
 /// First word of the files' names.
@@ -34,7 +34,7 @@ impl ForegroundMaps {
     }
 }
 
-impl ParticleSink for ForegroundMaps {
+impl Sink<ParticleFrame<'_>> for ForegroundMaps {
     fn accept(&mut self, step: &ParticleFrame<'_>) -> Result<()> {
         let map = step.tracker.record().foreground()?;
         self.album.add_grey(step.frame_index, map.map(|share| (255.0 * share).round() as u8))

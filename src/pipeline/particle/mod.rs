@@ -10,7 +10,7 @@ pub use rows::ParticleRows;
 
 use super::prefetch::Prefetch;
 use super::run::{Numbering, check_size};
-use super::sink::{Ending, end_all};
+use super::sink::{Sink, end_all};
 use super::track::{TrackSummary, too_few};
 use crate::error::{Error, Result};
 use crate::io::ColourSource;
@@ -19,7 +19,6 @@ use crate::track::ParticleTracker;
 use crate::track::particle::{ParticleOptions, ParticleTarget};
 use crate::types::{AnyColourFrame, TargetBox};
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 use std::time::Instant;
 
 /// The targets at one frame.
@@ -38,25 +37,10 @@ pub struct ParticleFrame<'a> {
 }
 
 /// A receiver of targets.
-pub trait ParticleSink: Send {
-    /// Takes the targets at one frame.
-    ///
-    /// # Errors
-    /// Files that cannot be written; the run then ends.
-    fn accept(&mut self, step: &ParticleFrame<'_>) -> Result<()>;
-
-    /// Called once at the end, however the run ended: names what is complete and removes the rest.
-    ///
-    /// # Errors
-    /// Files that cannot be written.
-    fn finish(&mut self, ending: Ending) -> Result<()>;
-
-    /// Files in place so far: their number and the latest one.
-    fn files(&self) -> (usize, Option<PathBuf>);
-}
+pub type ParticleSink = dyn for<'a> Sink<ParticleFrame<'a>>;
 
 /// Begins the sinks once the tracker has its first targets.
-pub type BeginParticleSinks<'a> = Box<dyn FnOnce() -> Result<Vec<Box<dyn ParticleSink>>> + 'a>;
+pub type BeginParticleSinks<'a> = Box<dyn FnOnce() -> Result<Vec<Box<ParticleSink>>> + 'a>;
 
 /// A target and where it starts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,7 +59,7 @@ pub struct ParticleRun {
     /// Targets still to start, by the index of their frame in the input.
     starts: BTreeMap<usize, Vec<(u64, TargetBox)>>,
     numbering: Numbering,
-    sinks: Vec<Box<dyn ParticleSink>>,
+    sinks: Vec<Box<ParticleSink>>,
     summary: TrackSummary,
 }
 

@@ -1,10 +1,10 @@
 //! Targets over colour frames, as pictures or a sequence.
 
-use super::{ParticleFrame, ParticleSink};
+use super::ParticleFrame;
 use crate::error::Result;
 use crate::image::picture::{GreyRange, PathPoint, TrackColours, TrackOverlay};
 use crate::pipeline::album::Album;
-use crate::pipeline::sink::Ending;
+use crate::pipeline::sink::{Ending, Sink};
 use crate::pipeline::track::PATH_LENGTH;
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -32,7 +32,7 @@ impl ParticleOverlays {
     }
 }
 
-impl ParticleSink for ParticleOverlays {
+impl Sink<ParticleFrame<'_>> for ParticleOverlays {
     fn accept(&mut self, step: &ParticleFrame<'_>) -> Result<()> {
         let range = *self.range.get_or_insert_with(|| GreyRange::of_colour(step.frame));
         let mut picture = range.colour_picture(step.frame);

@@ -1,9 +1,9 @@
 //! Targets followed by particle filters as rows of text.
 
-use super::{ParticleFrame, ParticleSink};
+use super::ParticleFrame;
 use crate::error::Result;
 use crate::io::cell;
-use crate::pipeline::sink::{Ending, TableTarget};
+use crate::pipeline::sink::{Ending, Sink, TableTarget};
 use crate::pipeline::track::{Row, RowWriter, TrackFormat};
 use crate::track::particle::ParticleTarget;
 use std::path::PathBuf;
@@ -45,7 +45,7 @@ fn row(target: &ParticleTarget) -> Row<'_> {
     Row { target: target.id as usize, state: &target.state, further: ParticleRows::cells(target) }
 }
 
-impl ParticleSink for ParticleRows {
+impl Sink<ParticleFrame<'_>> for ParticleRows {
     fn accept(&mut self, step: &ParticleFrame<'_>) -> Result<()> {
         self.rows.write((step.frame_index, step.time), step.targets.iter().map(row))
     }

@@ -193,7 +193,7 @@ fn time_to_contact(rate: f64, deviation: f64) -> (f64, f64) {
     if rate == 0.0 { (f64::INFINITY, f64::INFINITY) } else { (-1.0 / rate, deviation / (rate * rate)) }
 }
 
-impl<T: Real> Sink<T> for Egomotion {
+impl<T: Real> Sink<Step<'_, T>> for Egomotion {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
         let scene = self.scene(step.field)?;
         let rotation_prior = scene

@@ -38,7 +38,7 @@ impl<T: Real + Element> Fields<T> {
     }
 }
 
-impl<T: Real + Element> Sink<T> for Fields<T> {
+impl<T: Real + Element> Sink<Step<'_, T>> for Fields<T> {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
         let Place::Single(stem) = &self.plan.place else { return self.write(step.field) };
         if self.waiting.is_some() {

@@ -75,7 +75,7 @@ fn unit(quantity: Quantity, per_second: bool, pitch: (f64, f64)) -> String {
     if pitch == (1.0, 1.0) { unit.into() } else { unit.replace("px", "pitch unit") }
 }
 
-impl<T: Real> Sink<T> for Measurements {
+impl<T: Real> Sink<Step<'_, T>> for Measurements {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
         let field = step.field;
         self.check(field)?;

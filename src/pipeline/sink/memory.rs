@@ -25,7 +25,7 @@ impl<T: Real> Collect<T> {
     }
 }
 
-impl<T: Real> Sink<T> for Collect<T> {
+impl<T: Real> Sink<Step<'_, T>> for Collect<T> {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
         self.fields.lock().unwrap_or_else(PoisonError::into_inner).push(step.field.clone());
         Ok(())

@@ -42,13 +42,13 @@ pub enum Ending {
     Partial,
 }
 
-/// A receiver of results.
-pub trait Sink<T>: Send {
+/// A receiver of the results `S` of a run.
+pub trait Sink<S>: Send {
     /// Takes one result.
     ///
     /// # Errors
     /// Files that cannot be written; the run then ends.
-    fn accept(&mut self, step: &Step<'_, T>) -> Result<()>;
+    fn accept(&mut self, step: &S) -> Result<()>;
 
     /// Called once at the end, however the run ended: names what is complete and removes the rest.
     ///
@@ -61,6 +61,9 @@ pub trait Sink<T>: Send {
         (0, None)
     }
 }
+
+/// A receiver of fields.
+pub type FieldSink<T> = dyn for<'a> Sink<Step<'a, T>>;
 
 /// Ends every sink, even when an earlier one fails; returns the first error, that of the work included.
 pub(in crate::pipeline) fn end_all<S>(
@@ -82,12 +85,12 @@ impl OutputPlan {
     ///
     /// # Errors
     /// [`Error::Io`] when the folder cannot be made or written.
-    pub fn sinks<T: Real + Element>(&self, options: String, ranges: PictureRanges) -> Result<Vec<Box<dyn Sink<T>>>> {
+    pub fn sinks<T: Real + Element>(&self, options: String, ranges: PictureRanges) -> Result<Vec<Box<FieldSink<T>>>> {
         if let Place::Folder(folder) = &self.place {
             std::fs::create_dir_all(folder).map_err(|source| Error::io(folder, source))?;
             check_writable(folder)?;
         }
-        let mut sinks: Vec<Box<dyn Sink<T>>> = Vec::new();
+        let mut sinks: Vec<Box<FieldSink<T>>> = Vec::new();
         if !self.formats.is_empty() {
             sinks.push(Box::new(Fields::new(self.clone(), options)));
         }

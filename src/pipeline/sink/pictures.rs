@@ -121,7 +121,7 @@ fn stride<T>(field: &FlowField<T>) -> usize {
     }
 }
 
-impl<T: Real> Sink<T> for Pictures {
+impl<T: Real> Sink<Step<'_, T>> for Pictures {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
         self.seen += 1;
         for kind in self.plan.pictures.clone() {

@@ -134,7 +134,7 @@ impl Rows {
     }
 }
 
-impl<T: Real> Sink<T> for Rows {
+impl<T: Real> Sink<Step<'_, T>> for Rows {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
         let field = step.field;
         let table = match &mut self.table {

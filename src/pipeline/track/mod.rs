@@ -9,7 +9,7 @@ pub use rows::{TrackFormat, TrackRows};
 
 use super::prefetch::Prefetch;
 use super::run::{Numbering, check_size};
-use super::sink::{Ending, end_all};
+use super::sink::{Sink, end_all};
 use crate::error::{Error, Result};
 use crate::image::Preprocess;
 use crate::io::FrameSource;
@@ -34,29 +34,14 @@ pub struct TrackStep<'a> {
 }
 
 /// A receiver of tracks.
-pub trait TrackSink: Send {
-    /// Takes the targets at one frame.
-    ///
-    /// # Errors
-    /// Files that cannot be written; the run then ends.
-    fn accept(&mut self, step: &TrackStep<'_>) -> Result<()>;
-
-    /// Called once at the end, however the run ended: names what is complete and removes the rest.
-    ///
-    /// # Errors
-    /// Files that cannot be written.
-    fn finish(&mut self, ending: Ending) -> Result<()>;
-
-    /// Files in place so far: their number and the latest one.
-    fn files(&self) -> (usize, Option<PathBuf>);
-}
+pub type TrackSink = dyn for<'a> Sink<TrackStep<'a>>;
 
 /// What a run begins with: no file is begun for targets that cannot be followed.
 pub struct Begun {
     /// One tracker a target.
     pub trackers: Vec<Box<dyn Tracker>>,
     /// The receivers of the tracks.
-    pub sinks: Vec<Box<dyn TrackSink>>,
+    pub sinks: Vec<Box<TrackSink>>,
 }
 
 /// Makes trackers and sinks from the first frame in grey levels.
@@ -97,7 +82,7 @@ pub struct TrackRun {
     preprocess: Preprocess,
     threads: Threads,
     numbering: Numbering,
-    sinks: Vec<Box<dyn TrackSink>>,
+    sinks: Vec<Box<TrackSink>>,
     summary: TrackSummary,
 }
 

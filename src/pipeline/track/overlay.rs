@@ -1,10 +1,10 @@
 //! Tracks over the frames, as pictures or a sequence.
 
-use super::{TrackSink, TrackStep};
+use super::TrackStep;
 use crate::error::Result;
 use crate::image::picture::{GreyRange, PathPoint, TrackOverlay};
 use crate::pipeline::album::Album;
-use crate::pipeline::sink::Ending;
+use crate::pipeline::sink::{Ending, Sink};
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 
@@ -51,7 +51,7 @@ impl Overlays {
     }
 }
 
-impl TrackSink for Overlays {
+impl Sink<TrackStep<'_>> for Overlays {
     fn accept(&mut self, step: &TrackStep<'_>) -> Result<()> {
         self.follow(step);
         let range = *self.range.get_or_insert_with(|| GreyRange::of(step.frame));

@@ -1,9 +1,9 @@
 //! Tracks as rows of text.
 
-use super::{TrackSink, TrackStep};
+use super::TrackStep;
 use crate::error::Result;
 use crate::io::{MotTable, TrackTable};
-use crate::pipeline::sink::{Ending, TableTarget, end_table};
+use crate::pipeline::sink::{Ending, Sink, TableTarget, end_table};
 use crate::pipeline::text_format::TextFormat;
 use crate::types::TrackState;
 use std::path::{Path, PathBuf};
@@ -133,7 +133,7 @@ impl TrackRows {
     }
 }
 
-impl TrackSink for TrackRows {
+impl Sink<TrackStep<'_>> for TrackRows {
     fn accept(&mut self, step: &TrackStep<'_>) -> Result<()> {
         let row = |(index, state)| Row { target: index + 1, state, further: Vec::new() };
         self.rows.write((step.frame_index, step.time), step.states.iter().enumerate().map(row))
