@@ -244,14 +244,14 @@ pub fn doubles(argument: &'static str, object: &Bound<'_, PyAny>) -> PyResult<(V
 }
 
 /// A new array that owns `values`, of the given shape, row-major.
-pub fn owned<'py, T: Element>(py: Python<'py>, shape: &[usize], values: Vec<T>) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
-    numpy::PyArray1::from_vec(py, values).reshape(shape)
+pub fn owned<'py, T: Element>(py: Python<'py>, shape: &[usize], values: Vec<T>) -> PyResult<Bound<'py, PyAny>> {
+    Ok(numpy::PyArray1::from_vec(py, values).reshape(shape)?.into_any())
 }
 
 /// A frame as a new array `(H, W)`.
 pub fn from_frame<T: Element>(py: Python<'_>, frame: Frame<T>) -> PyResult<Bound<'_, PyAny>> {
     let (width, height) = frame.size();
-    Ok(owned(py, &[height, width], frame.into_data())?.into_any())
+    owned(py, &[height, width], frame.into_data())
 }
 
 /// A frame of any sample type as a new array `(H, W)`.

@@ -44,7 +44,7 @@ fn pixels<T: Element + Copy + 'static>(
 pub fn from_any_colour_frame(py: Python<'_>, frame: AnyColourFrame) -> PyResult<Bound<'_, PyAny>> {
     fn array<T: Element>(py: Python<'_>, frame: ColourFrame<T>) -> PyResult<Bound<'_, PyAny>> {
         let (width, height) = frame.size();
-        Ok(owned(py, &[height, width, 3], frame.into_data().into_flattened())?.into_any())
+        owned(py, &[height, width, 3], frame.into_data().into_flattened())
     }
     match frame {
         AnyColourFrame::U8(frame) => array(py, frame),

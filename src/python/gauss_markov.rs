@@ -63,7 +63,7 @@ impl PyGaussMarkovFilter {
     /// Position, velocity and acceleration along x and along y, (2, 3), px and frames.
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let values = self.0.x.iter().flat_map(|x| x.iter().copied()).collect();
-        Ok(arrays::owned::<f64>(py, &[2, 3], values)?.into_any())
+        arrays::owned::<f64>(py, &[2, 3], values)
     }
 
     /// Everything, as a dictionary for a pickle.
@@ -86,6 +86,6 @@ impl PyGaussMarkovFilter {
     /// Their covariances along x and along y, (2, 3, 3).
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let values = self.0.covariance().iter().flatten().flatten().copied().collect();
-        Ok(arrays::owned::<f64>(py, &[2, 3, 3], values)?.into_any())
+        arrays::owned::<f64>(py, &[2, 3, 3], values)
     }
 }

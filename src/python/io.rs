@@ -22,7 +22,7 @@ fn flow_image(flow: &Bound<'_, PyAny>) -> PyResult<FlowImage> {
 
 fn from_flow_image<'py>(py: Python<'py>, flow: &FlowImage) -> PyResult<Bound<'py, PyAny>> {
     let values = flow.u().iter().zip(flow.v()).flat_map(|(&u, &v)| [u, v]).collect();
-    Ok(arrays::owned(py, &[flow.height(), flow.width(), 2], values)?.into_any())
+    arrays::owned(py, &[flow.height(), flow.width(), 2], values)
 }
 
 /// Reads flow in one of the exchange formats.
@@ -51,10 +51,10 @@ pub fn read_float_map(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyAny
     let map = py.detach(|| read_pfm(&path))?;
     let mut planes = map.planes;
     if planes.len() == 1 {
-        return Ok(arrays::owned(py, &[map.height, map.width], planes.remove(0))?.into_any());
+        return arrays::owned(py, &[map.height, map.width], planes.remove(0));
     }
     let pixels = (0..map.height * map.width).flat_map(|i| planes.iter().map(move |plane| plane[i]));
-    Ok(arrays::owned(py, &[map.height, map.width, 3], pixels.collect())?.into_any())
+    arrays::owned(py, &[map.height, map.width, 3], pixels.collect())
 }
 
 /// Writes a float map.

@@ -240,5 +240,5 @@ pub(super) fn densities_and_shares(
 ) -> PyResult<(Bound<'_, PyAny>, Bound<'_, PyAny>)> {
     let shape = [sums.len(), shares.len() / sums.len().max(1)];
     let shares = arrays::owned(py, &shape, shares)?;
-    Ok((arrays::owned(py, &shape[..1], sums)?.into_any(), shares.into_any()))
+    Ok((arrays::owned(py, &shape[..1], sums)?, shares.into_any()))
 }

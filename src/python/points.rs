@@ -24,7 +24,7 @@ fn grey(argument: &str, object: &Bound<'_, PyAny>) -> PyResult<Frame<f32>> {
 
 /// Points as a new array (N, 2).
 fn pairs(py: Python<'_>, points: Vec<[f64; 2]>) -> PyResult<Bound<'_, PyAny>> {
-    Ok(arrays::owned(py, &[points.len(), 2], points.into_flattened())?.into_any())
+    arrays::owned(py, &[points.len(), 2], points.into_flattened())
 }
 
 /// Corners of `frame` (H, W): pixels whose surroundings change brightness along both axes (J. Shi, C. Tomasi,
@@ -129,7 +129,7 @@ pub fn point_flow<'py>(
     let count = [found.len()];
     Ok((
         pairs(py, found.iter().map(|point| point.flow).collect())?,
-        arrays::owned(py, &count, found.iter().map(|point| point.ok).collect())?.into_any(),
-        arrays::owned(py, &count, found.iter().map(|point| point.error).collect())?.into_any(),
+        arrays::owned(py, &count, found.iter().map(|point| point.ok).collect())?,
+        arrays::owned(py, &count, found.iter().map(|point| point.error).collect())?,
     ))
 }

@@ -104,7 +104,7 @@ impl Scene {
             let frame = py.detach(|| threads.install(|| self.core.frame(start + index as f64)));
             data.extend(frame.into_data());
         }
-        Ok(arrays::owned(py, &[count, height, width], data)?.into_any())
+        arrays::owned(py, &[count, height, width], data)
     }
 
     /// Exact flow and Jacobian of the frame of time `t` (frames), a FlowField (H, W) in px/frame and 1/frame.
@@ -131,7 +131,7 @@ impl Scene {
     /// array (6,); None without truth.
     fn motion<'py>(&self, py: Python<'py>, x: f64, y: f64, t: f64) -> PyResult<Option<Bound<'py, PyAny>>> {
         let motion = self.core.motion(x, y, t);
-        motion.map(|m| Ok(arrays::owned(py, &[6], m.to_array().to_vec())?.into_any())).transpose()
+        motion.map(|m| arrays::owned(py, &[6], m.to_array().to_vec())).transpose()
     }
 
     /// How far (x, y) px the matter at scene point (x, y) px and time t has gone `duration` frames later;

@@ -80,7 +80,7 @@ where
 }
 
 fn wrap(py: Python<'_>, (width, height): (usize, usize), labels: Vec<i32>) -> PyResult<Bound<'_, PyAny>> {
-    Ok(arrays::owned(py, &[height, width], labels)?.into_any())
+    arrays::owned(py, &[height, width], labels)
 }
 
 /// The compiled part of `jacoflow.segment.region_means`: means (n,) or (n, C). `labels` must be int64.
@@ -112,5 +112,5 @@ pub fn segment_region_means<'py>(
     })?;
     let shape = [count, channels];
     let shape = if value_shape.len() == 2 { &shape[..1] } else { &shape[..] };
-    Ok(arrays::owned(py, shape, means)?.into_any())
+    arrays::owned(py, shape, means)
 }

@@ -107,10 +107,10 @@ pub fn edge_disparity<'py>(
     let count = [found.rows.len()];
     Ok((
         arrays::from_frame(py, found.disparity)?,
-        arrays::owned(py, &count, found.rows)?.into_any(),
-        arrays::owned(py, &count, found.columns)?.into_any(),
-        arrays::owned(py, &count, found.values)?.into_any(),
-        arrays::owned(py, &count, found.scores)?.into_any(),
+        arrays::owned(py, &count, found.rows)?,
+        arrays::owned(py, &count, found.columns)?,
+        arrays::owned(py, &count, found.values)?,
+        arrays::owned(py, &count, found.scores)?,
         (found.row_offset, found.rows_doubtful),
     ))
 }
@@ -145,7 +145,7 @@ pub fn edge_pixels<'py>(
     let settings = EdgeSettings { blur_sigma, threshold, classes: options.classes };
     let map = py.detach(|| threads.install(|| EdgeMap::new(&view, &settings)));
     let count = [map.len()];
-    Ok((arrays::owned(py, &count, map.rows)?.into_any(), arrays::owned(py, &count, map.columns)?.into_any()))
+    Ok((arrays::owned(py, &count, map.rows)?, arrays::owned(py, &count, map.columns)?))
 }
 
 /// The format that a file's name means.

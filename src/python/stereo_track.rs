@@ -135,7 +135,7 @@ impl PyStereoTracker {
 
 /// Numbers that may be missing, as an array with NaN for them.
 fn numbers<const N: usize>(py: Python<'_>, values: Option<[f64; N]>) -> PyResult<Bound<'_, PyAny>> {
-    Ok(arrays::owned::<f64>(py, &[N], values.unwrap_or([f64::NAN; N]).to_vec())?.into_any())
+    arrays::owned::<f64>(py, &[N], values.unwrap_or([f64::NAN; N]).to_vec())
 }
 
 /// A cluster, by the names of `jacoflow.track.StereoCluster`.

@@ -95,7 +95,7 @@ impl TargetScene {
         let (t, drawn, threads) = (self.index(t)?, self.drawn(targets)?, Threads::new(None)?);
         let frame = py.detach(|| threads.install(|| self.core.frame_with(t, |target| drawn[target])));
         let (width, height) = frame.size();
-        Ok(arrays::owned(py, &[height, width, 3], frame.into_data().into_flattened())?.into_any())
+        arrays::owned(py, &[height, width, 3], frame.into_data().into_flattened())
     }
 
     /// All frames: uint8 array (T, H, W, 3), red, green and blue.
@@ -113,7 +113,7 @@ impl TargetScene {
             let frame = py.detach(|| threads.install(|| self.core.frame(t)));
             data.extend_from_slice(frame.data().as_flattened());
         }
-        Ok(arrays::owned(py, &[count, height, width, 3], data)?.into_any())
+        arrays::owned(py, &[count, height, width, 3], data)
     }
 
     /// Exact boxes of all frames and targets: float64 array (T, K, 4), left, top, width, height in px,
@@ -125,7 +125,7 @@ impl TargetScene {
         let (frames, targets) = (self.core.frame_count(), self.core.target_count());
         let boxes = (0..frames).flat_map(|t| (0..targets).map(move |k| self.core.target_box(t, k)));
         let values = boxes.flat_map(|b| [b.x, b.y, b.width, b.height]).collect();
-        Ok(arrays::owned::<f64>(py, &[frames, targets, 4], values)?.into_any())
+        arrays::owned::<f64>(py, &[frames, targets, 4], values)
     }
 
     /// Motion of the still world from each frame to the next: float64 array (T - 1, 2, 3).
@@ -134,7 +134,7 @@ impl TargetScene {
     fn camera_motion<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let steps = self.core.frame_count() - 1;
         let values = (0..steps).flat_map(|t| self.core.camera_motion(t)).flatten().collect();
-        Ok(arrays::owned::<f64>(py, &[steps, 2, 3], values)?.into_any())
+        arrays::owned::<f64>(py, &[steps, 2, 3], values)
     }
 
     /// The same name and options, so the same pictures.

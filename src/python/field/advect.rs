@@ -55,13 +55,13 @@ impl FlowField {
             leading.into_iter().chain(tail.iter().copied()).collect()
         };
         let places = kept.iter().flat_map(|(points, _)| points.as_flattened().iter().copied()).collect();
-        let places = arrays::owned(py, &shape(&[2]), places)?.into_any();
+        let places = arrays::owned(py, &shape(&[2]), places)?;
         if covariance.is_none() {
             return Ok(places);
         }
         let spreads = kept.iter().filter_map(|(_, spread)| spread.as_ref());
         let spreads = spreads.flat_map(|spread| spread.as_flattened().as_flattened().iter().copied()).collect();
-        let spreads = arrays::owned(py, &shape(&[2, 2]), spreads)?.into_any();
+        let spreads = arrays::owned(py, &shape(&[2, 2]), spreads)?;
         Ok((places, spreads).into_pyobject(py)?.into_any())
     }
 }

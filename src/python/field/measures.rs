@@ -63,7 +63,7 @@ impl FlowField {
                 let field = self.core(packed, index);
                 data.extend(py.detach(|| derived::value(&field, name))?);
             }
-            Ok(arrays::owned(py, &self.shape(), data)?.into_any())
+            arrays::owned(py, &self.shape(), data)
         })
     }
 
@@ -78,7 +78,7 @@ impl FlowField {
                 let field = self.core(packed, index);
                 data.extend(py.detach(|| derived::std(&field, name))?);
             }
-            Ok(arrays::owned(py, &self.shape(), data)?.into_any())
+            arrays::owned(py, &self.shape(), data)
         })
     }
 

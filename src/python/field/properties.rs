@@ -40,7 +40,7 @@ getters! {
         let sites = width * height;
         let codes = each!(this.store, packed => &packed.status[this.start * sites..(this.start + this.count) * sites]);
         let valid = codes.iter().map(|&code| Status::from_code(code).is_some_and(Status::is_valid)).collect();
-        Ok(arrays::owned::<bool>(slf.py(), &this.shape(), valid)?.into_any())
+        arrays::owned::<bool>(slf.py(), &this.shape(), valid)
     };
     /// Root mean square residual of the equations, array (..., H, W), grey levels; None if the method has
     /// none.
@@ -66,7 +66,7 @@ getters! {
         } else {
             vec![height, width, 2]
         };
-        Ok(arrays::owned(slf.py(), &shape, data.collect())?.into_any())
+        arrays::owned(slf.py(), &shape, data.collect())
     };
     /// Index of the frame the estimate belongs to, counted from 0 (no unit); of the first one for a stack.
     frame_index(this) -> usize = this.first_frame();
@@ -98,7 +98,7 @@ impl FlowField {
             }
             let data: Vec<_> = (0..this.count).filter_map(|t| this.core(packed, t).covariance_matrices()).flatten().collect();
             let shape: Vec<usize> = this.shape().into_iter().chain([6, 6]).collect();
-            Ok(Some(arrays::owned(slf.py(), &shape, data)?.into_any()))
+            Ok(Some(arrays::owned(slf.py(), &shape, data)?))
         })
     }
 

@@ -27,7 +27,7 @@ impl Callbacks {
         function: impl for<'py> FnOnce(Python<'py>, Vec<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>>,
     ) -> Result<()> {
         Python::attach(|py| {
-            let arrays = inputs.iter().map(|(shape, values)| Ok(arrays::owned(py, shape, values.to_vec())?.into_any()));
+            let arrays = inputs.iter().map(|(shape, values)| arrays::owned(py, shape, values.to_vec()));
             let result = function(py, arrays.collect::<PyResult<_>>()?)?;
             let (shape, values) = arrays::doubles(name, &result)?;
             if shape != shape_out {

@@ -38,8 +38,8 @@ impl GaussianFilter {
     pub fn new(py: Python<'_>, state: &GaussianState, batch: Option<usize>) -> PyResult<Self> {
         let variables = Variables { arrays: std::array::from_fn(|_| py.None()), repairs: 0 };
         let filter = Self { dim_x: state.dim_x, dim_z: state.dim_z, batch, variables: Mutex::new(variables) };
-        filter.set(2, arrays::owned(py, &[state.dim_x; 2], state.Q.clone())?.into_any().unbind());
-        filter.set(3, arrays::owned(py, &[state.dim_z; 2], state.R.clone())?.into_any().unbind());
+        filter.set(2, arrays::owned(py, &[state.dim_x; 2], state.Q.clone())?.unbind());
+        filter.set(3, arrays::owned(py, &[state.dim_z; 2], state.R.clone())?.unbind());
         filter.take(py, state)?;
         Ok(filter)
     }
@@ -89,7 +89,7 @@ impl GaussianFilter {
         let results =
             [(0, &state.x), (1, &state.P), (4, &state.y), (5, &state.S), (6, &state.K), (7, &state.log_likelihood)];
         for (index, values) in results {
-            self.set(index, arrays::owned(py, &self.shape(index), values.clone())?.into_any().unbind());
+            self.set(index, arrays::owned(py, &self.shape(index), values.clone())?.unbind());
         }
         self.variables().repairs = state.repairs;
         Ok(())
@@ -132,7 +132,7 @@ impl GaussianFilter {
             values = values.repeat(self.batch.unwrap_or(1));
             shape = self.shape(index);
         }
-        Ok(arrays::owned(py, &shape, values)?.into_any().unbind())
+        Ok(arrays::owned(py, &shape, values)?.unbind())
     }
 
     /// Measurements `(m,)` or `(B, m)`; `None` is a missing one, a number is taken for `m = 1`.

@@ -45,8 +45,8 @@ impl KalmanFilter {
     fn new(py: Python<'_>, dim_x: usize, dim_z: usize, batch: Option<usize>) -> PyResult<PyClassInitializer<Self>> {
         let core = Core::new(batch.unwrap_or(1), dim_x, dim_z)?;
         let base = GaussianFilter::new(py, &core.state, batch)?;
-        let f = arrays::owned(py, &[dim_x, dim_x], core.F.clone())?.into_any().unbind();
-        let h = arrays::owned(py, &[dim_z, dim_x], core.H.clone())?.into_any().unbind();
+        let f = arrays::owned(py, &[dim_x, dim_x], core.F.clone())?.unbind();
+        let h = arrays::owned(py, &[dim_z, dim_x], core.H.clone())?.unbind();
         Ok(PyClassInitializer::from(base).add_subclass(Self {
             core: Mutex::new(core),
             f: Mutex::new(f),
@@ -64,7 +64,7 @@ impl KalmanFilter {
         let base = slf.as_super().get();
         let (batch, n) = (base.batch, base.dim_x);
         let (shape, values) = Self::matrix("F", value, batch, [n, n])?;
-        write(&slf.get().f, arrays::owned(slf.py(), &shape, values)?.into_any().unbind());
+        write(&slf.get().f, arrays::owned(slf.py(), &shape, values)?.unbind());
         Ok(())
     }
     /// Measurement matrix, array (m, n) or (B, m, n), measurement units per state unit; zero at first.
@@ -77,7 +77,7 @@ impl KalmanFilter {
         let base = slf.as_super().get();
         let (batch, n, m) = (base.batch, base.dim_x, base.dim_z);
         let (shape, values) = Self::matrix("H", value, batch, [m, n])?;
-        write(&slf.get().h, arrays::owned(slf.py(), &shape, values)?.into_any().unbind());
+        write(&slf.get().h, arrays::owned(slf.py(), &shape, values)?.unbind());
         Ok(())
     }
 

@@ -28,9 +28,9 @@ getters! {
     /// Secondary spread (no unit).
     kappa(this) -> f64 = this.points.kappa;
     /// Weights of the mean, array (2 n + 1,), centre first (no unit).
-    Wm(this, slf) -> PyResult<Bound<'py, PyAny>> = Ok(arrays::owned(slf.py(), &[SigmaPoints::count(this.n)], this.points.mean_weights(this.n))?.into_any());
+    Wm(this, slf) -> PyResult<Bound<'py, PyAny>> = arrays::owned(slf.py(), &[SigmaPoints::count(this.n)], this.points.mean_weights(this.n));
     /// Weights of the covariance, array (2 n + 1,), centre first (no unit).
-    Wc(this, slf) -> PyResult<Bound<'py, PyAny>> = Ok(arrays::owned(slf.py(), &[SigmaPoints::count(this.n)], this.points.covariance_weights(this.n))?.into_any());
+    Wc(this, slf) -> PyResult<Bound<'py, PyAny>> = arrays::owned(slf.py(), &[SigmaPoints::count(this.n)], this.points.covariance_weights(this.n));
 }
 
 #[pymethods]
@@ -73,7 +73,7 @@ impl MerweScaledSigmaPoints {
             return Err(Error::argument("P", format!("shape [{n}, {n}]"), format!("shape {shape_p:?}")).into());
         }
         let points = self.points.sigma_points(&mean, &covariance)?;
-        Ok(arrays::owned(x.py(), &[SigmaPoints::count(n), n], points)?.into_any())
+        arrays::owned(x.py(), &[SigmaPoints::count(n), n], points)
     }
     fn __repr__(&self) -> String {
         let SigmaPoints { alpha, beta, kappa } = self.points;

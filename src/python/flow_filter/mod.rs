@@ -135,7 +135,7 @@ impl FlowFilter {
         let Some(((width, height), values)) = values else { return Ok(None) };
         let is_points = matches!(self.filter.options().sites, SamplingGrid::Points(_));
         let sites = if is_points { vec![width] } else { vec![height, width] };
-        Ok(Some(arrays::owned(py, &[&sites[..], tail].concat(), values)?.into_any()))
+        Ok(Some(arrays::owned(py, &[&sites[..], tail].concat(), values)?))
     }
 }
 

@@ -36,7 +36,7 @@ pub fn motion3d_field_points<'py>(
     Ok((
         matrix(py, &found.points)?.into_any(),
         matrix(py, &found.flow)?.into_any(),
-        arrays::owned(py, &[n, 2, 2], found.covariances)?.into_any(),
+        arrays::owned(py, &[n, 2, 2], found.covariances)?,
         [
             found.spacing,
             found.points_per_independent_sample,
@@ -163,8 +163,8 @@ pub fn motion3d_contact_map<'py>(
     })?;
     let shape = [found.height, found.width];
     Ok((
-        arrays::owned(py, &shape, found.contact)?.into_any(),
-        arrays::owned(py, &shape, found.deviation)?.into_any(),
-        arrays::owned(py, &shape, found.residual)?.into_any(),
+        arrays::owned(py, &shape, found.contact)?,
+        arrays::owned(py, &shape, found.deviation)?,
+        arrays::owned(py, &shape, found.residual)?,
     ))
 }

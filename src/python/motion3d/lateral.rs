@@ -4,7 +4,6 @@ use super::given::{rows, word};
 use crate::error::Error;
 use crate::motion3d::{LateralBound, LateralEstimate, LateralWeights, estimate_lateral, lateral_bound};
 use crate::python::arrays;
-use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 /// Weights by the words of the Python function.
@@ -18,7 +17,7 @@ pub struct PyLateral<'py> {
     variance: f64,
     crlb: f64,
     noise_std: f64,
-    inv_depth: Bound<'py, PyArrayDyn<f64>>,
+    inv_depth: Bound<'py, PyAny>,
 }
 
 /// A bound.

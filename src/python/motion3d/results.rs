@@ -2,10 +2,9 @@
 
 use crate::motion3d::{CommonEffect, Motion, MotionBound, MotionEstimate};
 use crate::python::arrays;
-use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
-type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
+type Array<'py> = Bound<'py, PyAny>;
 
 /// The rows one after the other.
 pub fn flat<const D: usize>(rows: &[[f64; D]]) -> Vec<f64> {
@@ -81,7 +80,7 @@ pub struct PyEstimate<'py> {
     time_to_contact_std: Array<'py>,
     approach_rate: f64,
     approach_rate_std: f64,
-    inliers: Bound<'py, PyArrayDyn<bool>>,
+    inliers: Array<'py>,
     noise_std: f64,
     residuals: Array<'py>,
     alternatives: Vec<PyMotion<'py>>,

@@ -3,7 +3,6 @@
 use crate::error::Error;
 use crate::python::arrays;
 use crate::track::particle::{ParticleStep, ParticleTarget, StepRecord};
-use numpy::{PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyTuple};
 
@@ -19,11 +18,7 @@ impl PyParticleStep {
     }
 
     /// Particles (N, 6) and weights (N,) of a target; None where they were not kept.
-    fn particles<'py>(
-        &self,
-        py: Python<'py>,
-        id: u64,
-    ) -> PyResult<Option<(Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>)>> {
+    fn particles<'py>(&self, py: Python<'py>, id: u64) -> PyResult<Option<(Bound<'py, PyAny>, Bound<'py, PyAny>)>> {
         let Some((particles, weights)) = self.0.particles(id)? else { return Ok(None) };
         let count = weights.len();
         let particles = arrays::owned(py, &[count, 6], particles.as_flattened().to_vec())?;
@@ -38,7 +33,7 @@ impl PyParticleStep {
     /// Labels of the segments (H, W).
     fn segments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let labels = py.detach(|| self.0.segments())?;
-        Ok(arrays::owned(py, &[labels.height, labels.width], labels.labels)?.into_any())
+        arrays::owned(py, &[labels.height, labels.width], labels.labels)
     }
 
     /// Whether it keeps the frame.
@@ -112,7 +107,7 @@ fn tracks<'py>(py: Python<'py>, step: &ParticleStep) -> PyResult<Bound<'py, PyDi
     let ids = tracks.iter().map(|track| signed(track.id)).collect::<PyResult<_>>()?;
     out.set_item("ids", arrays::owned::<i64>(py, &[count], ids)?)?;
     let pairs = |pair: fn(&crate::track::particle::CornerTrack) -> [f64; 2]| {
-        arrays::owned::<f64>(py, &[count * 2], tracks.iter().flat_map(pair).collect())?.reshape([count, 2])
+        arrays::owned::<f64>(py, &[count, 2], tracks.iter().flat_map(pair).collect())
     };
     out.set_item("positions", pairs(|track| track.position)?)?;
     out.set_item("residuals", pairs(|track| track.residual)?)?;

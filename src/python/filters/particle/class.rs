@@ -46,7 +46,7 @@ impl ParticleFilter {
     /// A new array with the core's particles; arrays handed out before keep their values.
     pub(super) fn take(&self, py: Python<'_>, core: &mut Core) -> PyResult<()> {
         let shape = lead(self.batch, &[core.particles(), self.dim_x]);
-        write(&self.x, arrays::owned(py, &shape, std::mem::take(&mut core.x))?.into_any().unbind());
+        write(&self.x, arrays::owned(py, &shape, std::mem::take(&mut core.x))?.unbind());
         Ok(())
     }
 
@@ -64,7 +64,7 @@ impl ParticleFilter {
         let values = py.detach(|| function(work))?;
         core.x = Vec::new();
         let shape: Vec<_> = axes.iter().copied().chain(lead(self.batch, tail)).collect();
-        Ok(arrays::owned(py, &shape, values)?.into_any())
+        arrays::owned(py, &shape, values)
     }
 
     /// Numbers of each filter, `()` or `(B,)`.
@@ -74,7 +74,7 @@ impl ParticleFilter {
         of: impl FnOnce(&Core) -> Vec<T>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let values = of(&*lock(&self.core)?);
-        Ok(arrays::owned(py, &lead(self.batch, &[]), values)?.into_any())
+        arrays::owned(py, &lead(self.batch, &[]), values)
     }
 
     /// A matrix `(n, n)` or `(B, n, n)`; a number is that multiple of the identity.

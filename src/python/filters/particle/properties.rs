@@ -17,7 +17,7 @@ getters! {
     log_weights(this, slf) -> PyResult<Bound<'py, PyAny>> = {
         let core = lock(&this.core)?;
         let shape = lead(this.batch, &[core.particles()]);
-        let array = arrays::owned(slf.py(), &shape, core.log_weights.clone())?.into_any();
+        let array = arrays::owned(slf.py(), &shape, core.log_weights.clone())?;
         array.getattr("flags")?.setattr("writeable", false)?;
         Ok(array)
     };
@@ -25,7 +25,7 @@ getters! {
     weights(this, slf) -> PyResult<Bound<'py, PyAny>> = {
         let core = lock(&this.core)?;
         let values = core.log_weights.iter().map(|log| log.exp()).collect();
-        Ok(arrays::owned(slf.py(), &lead(this.batch, &[core.particles()]), values)?.into_any())
+        arrays::owned(slf.py(), &lead(this.batch, &[core.particles()]), values)
     };
     /// Weighted mean, array (n,) or (B, n), in the state's units.
     mean(this, slf) -> PyResult<Bound<'py, PyAny>> = this.estimate(slf.py(), &[], &[this.dim_x], Core::mean);
@@ -62,7 +62,7 @@ impl ParticleFilter {
     fn set_x(&self, value: &Bound<'_, PyAny>) -> PyResult<()> {
         let shape = self.shape(value.py())?;
         let values = particles(value, &shape)?;
-        write(&self.x, arrays::owned(value.py(), &shape, values)?.into_any().unbind());
+        write(&self.x, arrays::owned(value.py(), &shape, values)?.unbind());
         Ok(())
     }
     #[setter]

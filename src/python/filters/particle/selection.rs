@@ -52,7 +52,7 @@ pub fn resample<'py>(
         py.detach(|| scheme.indices(&weights, number, &rng, &mut indices));
     }
     let indices: Vec<i64> = indices.into_iter().map(|i| i as i64).collect();
-    Ok(arrays::owned(py, &[number], indices)?.into_any())
+    arrays::owned(py, &[number], indices)
 }
 
 /// `random_state`: an integer that is not negative.

@@ -147,6 +147,6 @@ impl ParticleFilter {
         let work = &mut *core;
         let resampled = py.detach(|| work.resample(scheme, threshold, n_particles))?;
         self.take(py, &mut core)?;
-        Ok(arrays::owned(py, &lead(self.batch, &[]), resampled)?.into_any())
+        arrays::owned(py, &lead(self.batch, &[]), resampled)
     }
 }
