@@ -61,6 +61,19 @@ pub struct MethodInfo {
     pub chooses_window: bool,
 }
 
+/// What most methods are.
+const USUAL: MethodInfo = MethodInfo {
+    name: "",
+    options: &[],
+    presets: &[],
+    time_schemes: &[],
+    models: &[ModelKind::Affine],
+    smooths_frames: false,
+    has_covariance: true,
+    has_systematic: false,
+    chooses_window: false,
+};
+
 /// Every method, the recommended one first.
 pub const METHODS: &[MethodInfo] = &[
     MethodInfo {
@@ -68,55 +81,39 @@ pub const METHODS: &[MethodInfo] = &[
         options: &["preset", "levels", "time_scheme"],
         presets: &Preset::EVERY,
         time_schemes: &["forward", "central", PAIR],
-        models: &[ModelKind::Affine],
-        smooths_frames: false,
-        has_covariance: true,
         has_systematic: true,
         chooses_window: true,
+        ..USUAL
     },
     MethodInfo {
         name: "windowed",
         options: &["time_scheme", "neighbourhood", "neighbourhood_sigma", "window_sigma", "rows", "rank_deficient"],
-        presets: &[],
         time_schemes: &["central", "backward", PAIR],
-        models: &[ModelKind::Affine],
         smooths_frames: true,
-        has_covariance: true,
         has_systematic: true,
-        chooses_window: false,
+        ..USUAL
     },
     MethodInfo {
         name: "instantaneous",
         options: &["model", "time_scheme", "neighbourhood", "neighbourhood_sigma", "rank_deficient"],
-        presets: &[],
         time_schemes: &["central", "backward"],
         models: ModelKind::ALL,
-        smooths_frames: false,
-        has_covariance: true,
-        has_systematic: false,
-        chooses_window: false,
+        ..USUAL
     },
     MethodInfo {
         name: "lucas_kanade",
         options: &["time_scheme", "window_sigma"],
-        presets: &[],
         time_schemes: &["central", PAIR],
         models: &[ModelKind::Translational],
-        smooths_frames: false,
-        has_covariance: true,
-        has_systematic: false,
-        chooses_window: false,
+        ..USUAL
     },
     MethodInfo {
         name: "horn_schunck",
         options: &["time_scheme", "smoothness", "iterations"],
-        presets: &[],
         time_schemes: &["central", PAIR],
         models: &[ModelKind::Translational],
-        smooths_frames: false,
         has_covariance: false,
-        has_systematic: false,
-        chooses_window: false,
+        ..USUAL
     },
 ];
 

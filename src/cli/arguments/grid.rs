@@ -99,14 +99,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rectangles_need_four_whole_numbers() {
-        assert_eq!(parse_rect("1,2,3,4"), Ok(Rect { x: 1, y: 2, width: 3, height: 4 }));
-        for wrong in ["1,2,3", "1,2,3,0", "1,2,3,4,5", "a,b,c,d", "-1,0,3,3", ""] {
-            assert!(parse_rect(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
     fn points_come_from_words_and_from_files() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("points.csv");

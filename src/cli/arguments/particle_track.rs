@@ -138,16 +138,4 @@ mod tests {
         std::fs::write(&path, "1,-1,1,1,5,6,1\n").unwrap();
         assert!(starts(all, None).unwrap_err().to_string().contains("number of at least 0"));
     }
-
-    #[test]
-    fn boxes_come_from_one_place() {
-        let bounds = TargetBox { x: 1.0, y: 2.0, width: 3.0, height: 4.0 };
-        let numbering = Numbering { start: 5, step: 1, rate: None };
-        let starts = arguments(None).starts(&[bounds, bounds], numbering, None).unwrap();
-        assert_eq!(starts.iter().map(|start| (start.id, start.frame)).collect::<Vec<_>>(), [(1, 5), (2, 5)]);
-        let none = arguments(None).starts(&[], numbering, None).unwrap_err().to_string();
-        assert!(none.starts_with("box: expected a --box"), "{none}");
-        let both = arguments(Some("a.csv".into())).starts(&[bounds], numbering, None).unwrap_err().to_string();
-        assert!(both.starts_with("boxes: expected either"), "{both}");
-    }
 }

@@ -157,16 +157,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn boxes_and_points_are_read() {
-        assert_eq!(parse_box("-1.5, 2,13,5"), Ok(TargetBox { x: -1.5, y: 2.0, width: 13.0, height: 5.0 }));
-        for wrong in ["1,2,3", "1,2,0,3", "1,2,3,4,5", "1,2,nan,3", "a,b,c,d", ""] {
-            assert!(parse_box(wrong).is_err(), "{wrong}");
-        }
-        assert_eq!(parse_point("3.5,-4"), Ok([3.5, -4.0]));
-        assert!(parse_point("3").is_err() && parse_point("inf,1").is_err());
-    }
-
-    #[test]
     fn boxes_come_before_points_and_nothing_means_what_moves() {
         let none = TargetArguments { boxes: vec![], points: vec![] };
         assert_eq!(none.starts(), [Start::Motion]);
