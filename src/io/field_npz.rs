@@ -205,7 +205,7 @@ fn optional_arrays<T>(field: &FlowField<T>) -> Vec<String> {
 }
 
 /// The planes called `names`, interleaved by site; NaN without an estimate, zero by the model.
-pub(super) fn interleaved<T: Real>(field: &FlowField<T>, names: &[&str]) -> Vec<T> {
+fn interleaved<T: Real>(field: &FlowField<T>, names: &[&str]) -> Vec<T> {
     let planes: Vec<Option<&[T]>> = names.iter().map(|name| field.plane(name)).collect();
     let mut out = Vec::with_capacity(names.len() * field.len());
     for i in 0..field.len() {
@@ -311,6 +311,3 @@ impl Shape {
         Ok(array.values)
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -2,9 +2,9 @@
 
 use crate::fields::numbered;
 use jacoflow::error::Error;
-use jacoflow::io::npz::NpzReader;
+use jacoflow::io::npz::{NpzReader, NpzWriter};
 use jacoflow::io::{read_npz_from, write_npz_to};
-use jacoflow::types::{FlowField, Rect, SamplingGrid};
+use jacoflow::types::{FlowField, MOTION_NAMES, Rect, SamplingGrid};
 use std::io::Cursor;
 
 fn stored(field: &FlowField<f32>) -> NpzReader<Cursor<Vec<u8>>> {
@@ -71,4 +71,35 @@ fn flow_and_jacobian_are_arranged_for_numpy() {
     assert_eq!(jacobian.shape, [5, 7, 2, 2]);
     assert_eq!(jacobian.values[..4], [2.0 * n, 4.0 * n, 3.0 * n, 5.0 * n], "u_x, u_y, v_x, v_y");
     assert!(npz.text("metadata").unwrap().contains("\"min_norm\""));
+}
+
+#[test]
+fn parameters_that_the_model_lacks_are_zero_but_not_where_there_is_no_estimate() {
+    let mut layout = numbered(SamplingGrid::default()).layout;
+    layout.model = "translational".into();
+    layout.parameters = vec!["u".into(), "v".into()];
+    let mut field = FlowField::<f32>::empty(layout, false).unwrap();
+    let sites = field.len();
+    (field.motion[1], field.motion[sites + 1]) = (2.0, 3.0);
+    let jacobian = stored(&field).array::<f32>("jacobian").unwrap().values;
+    assert!(jacobian[..4].iter().all(|value| value.is_nan()) && jacobian[4..8] == [0.0; 4]);
+}
+
+#[test]
+fn arrays_that_do_not_fit_are_refused() {
+    let field = numbered(SamplingGrid::default());
+    let metadata = stored(&field).text("metadata").unwrap();
+    let mut npz = NpzWriter::new(Cursor::new(Vec::new()), "x");
+    npz.text("metadata", &metadata).unwrap();
+    let codes: Vec<u8> = field.status.iter().map(|status| *status as u8).collect();
+    npz.array("status", &[field.height, field.width], &codes).unwrap();
+    npz.array("motion", &[MOTION_NAMES.len(), field.width, field.height], &field.motion).unwrap();
+    let mut npz = NpzReader::new(npz.into_inner().unwrap(), "x").unwrap();
+    let message = read_npz_from::<f32, _>(&mut npz).unwrap_err().to_string();
+    let expected = format!("[{}, {}, {}]", MOTION_NAMES.len(), field.height, field.width);
+    assert!(message.contains("'motion'") && message.contains(&expected), "{message}");
+    let mut npz = NpzWriter::new(Cursor::new(Vec::new()), "x");
+    npz.text("metadata", "{}").unwrap();
+    let mut npz = NpzReader::new(npz.into_inner().unwrap(), "x").unwrap();
+    assert!(matches!(read_npz_from::<f32, _>(&mut npz), Err(Error::Format { .. })));
 }

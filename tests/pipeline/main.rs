@@ -7,3 +7,4 @@ mod sink_table;
 mod stereo;
 mod stereo_times;
 mod track;
+mod track_overlay;

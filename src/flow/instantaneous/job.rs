@@ -13,7 +13,7 @@ use super::propagation::factor_memory;
 use super::uncertainty::{Detail, LaneEstimate, estimate_affine};
 use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{FieldBand, MaskCounts};
-use crate::jet::{JetRates, TimeScheme};
+use crate::jet::JetRates;
 use crate::simd::{SimdReal, dispatch};
 use crate::types::{Frame, Mask, Rect, Status};
 use std::ops::Range;
@@ -118,15 +118,7 @@ impl<T: SimdReal> Job<'_, T> {
             }
         }
         let target = Target::Motion(motion, trust);
-        self.run_row(RowKernel {
-            source,
-            scheme: self.scheme(),
-            frames: self.frames,
-            y,
-            columns: columns.clone(),
-            scratch,
-            target,
-        });
+        self.run_row(source, y, columns.clone(), scratch, target);
         if *stride > 1 {
             for (plane, values) in band.motion.iter_mut().zip(spare.chunks_exact(n)) {
                 for (to, from) in plane[places.clone()].iter_mut().zip(values.iter().step_by(*stride)) {
@@ -151,15 +143,7 @@ impl<T: SimdReal> Job<'_, T> {
         let RowBuffers { columns, stride, scratch, trust, spare, block } = buffers;
         let len = columns.len();
         let target = Target::Rates(RatesRow { values: spare, len });
-        self.run_row(RowKernel {
-            source,
-            scheme: self.scheme(),
-            frames: self.frames,
-            y,
-            columns: columns.clone(),
-            scratch,
-            target,
-        });
+        self.run_row(source, y, columns.clone(), scratch, target);
         RatesRow { values: &mut spare[..], len }.thin(*stride);
         let mut motion: [&mut [T]; 6] = Default::default();
         for (slot, plane) in motion.iter_mut().zip(&mut band.motion) {
@@ -180,16 +164,13 @@ impl<T: SimdReal> Job<'_, T> {
     }
 
     /// One place, so that the kernel is compiled once.
-    fn run_row(&self, kernel: RowKernel<'_, T>) {
-        dispatch(self.common.level(), kernel);
+    fn run_row(&self, source: &Source<T>, y: usize, columns: Range<usize>, scratch: &mut [T], target: Target<'_, T>) {
+        let (scheme, frames) = (self.owner.options.scheme, self.frames);
+        dispatch(self.common.level(), RowKernel { source, scheme, frames, y, columns, scratch, target });
     }
 
     fn detail(&self) -> Detail {
         Detail { covariance: self.common.covariance, diagnostics: self.common.diagnostics }
-    }
-
-    fn scheme(&self) -> TimeScheme {
-        self.owner.options.scheme
     }
 
     /// One site of the affine model: normal equations in double precision, and the careful path where even

@@ -73,25 +73,3 @@ impl Sink<TrackStep<'_>> for Overlays {
         self.album.files()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::types::{AnyFrame, Frame, TargetBox, TrackState};
-
-    #[test]
-    fn a_path_stays_bounded_and_earlier_pictures_are_not_mixed() {
-        let folder = tempfile::tempdir().unwrap();
-        let mut overlays = Overlays::create(folder.path(), TrackOverlay::default(), 25.0).unwrap();
-        let frame = AnyFrame::U8(Frame::filled(16, 16, 0));
-        let states = [TrackState::at([6.0, 8.0], TargetBox::about([6.0, 8.0], 5.0, 3.0))];
-        for index in 0..PATH_LENGTH + 5 {
-            overlays.follow(&TrackStep { frame_index: index, time: None, frame: &frame, states: &states });
-        }
-        assert_eq!(overlays.paths[0].len(), PATH_LENGTH);
-        overlays.accept(&TrackStep { frame_index: 3, time: None, frame: &frame, states: &states }).unwrap();
-        assert!(Overlays::check(folder.path()).unwrap_err().to_string().contains("track_000003.png"));
-        assert!(Overlays::check(&folder.path().join("new")).is_ok());
-        assert!(Overlays::check(&folder.path().join("track_000003.png")).is_err());
-    }
-}
