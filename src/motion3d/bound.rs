@@ -4,7 +4,7 @@ use super::kernels::{equations, information, slopes};
 use super::model::input::{Flow, Noise, Placement};
 use super::model::motion::Motion;
 use super::model::observations::Observations;
-use super::model::result::nested;
+use super::model::result::{axes, nested};
 use super::model::rows::{Matrix5, Vector5, tangents};
 use super::model::whitening::Whitening;
 use super::solver::covariance::{determined, direction_deviation};
@@ -32,14 +32,24 @@ pub struct MotionBound {
 }
 
 impl MotionBound {
-    pub(crate) fn of(tangent: &Matrix2x3<f64>, bound: &Matrix5, likelihood: &Matrix5, ideal: &Matrix5) -> Self {
-        Self {
-            bound: nested(bound),
-            likelihood: nested(likelihood),
-            ideal: nested(ideal),
-            direction_std: [bound, likelihood, ideal].map(direction_deviation),
-            tangent: std::array::from_fn(|i| std::array::from_fn(|j| tangent[(i, j)])),
-        }
+    /// From the information `M`, the noise `P` of the depths in it and `sum c_kk P_k` for a bound.
+    pub(crate) fn of(
+        tangent: &Matrix2x3<f64>,
+        information: &Matrix5,
+        noise: &Matrix5,
+        weighted: impl Fn(&Matrix5) -> Matrix5,
+    ) -> Result<Self> {
+        let bound = determined(information).ok_or_else(|| {
+            Error::NotObservable("these points do not determine the motion; more of them, or others, would".into())
+        })?;
+        let (likelihood, ideal) = (bound + bound * noise * bound, bound + bound * weighted(&bound) * bound);
+        Ok(Self {
+            bound: nested(&bound),
+            likelihood: nested(&likelihood),
+            ideal: nested(&ideal),
+            direction_std: [bound, likelihood, ideal].map(|covariance| direction_deviation(&covariance)),
+            tangent: axes(tangent),
+        })
     }
 }
 
@@ -91,15 +101,8 @@ fn of_known_depths(
     nu.resize(observations.stride, 0.0);
     let tangent = tangents(&motion.u());
     let m = information(&observations, motion, &tangent, &nu, 0.0);
-    let bound = determined(&m).ok_or_else(not_determined)?;
     let noise = equations(&observations, motion, &tangent, None).p;
-    let likelihood = bound + bound * noise * bound;
-    let ideal = bound + bound * weighted_noise(&observations, motion, &tangent, &nu, &bound) * bound;
-    Ok(MotionBound::of(&tangent, &bound, &likelihood, &ideal))
-}
-
-pub(crate) fn not_determined() -> Error {
-    Error::NotObservable("these points do not determine the motion; more of them, or others, would".into())
+    MotionBound::of(&tangent, &m, &noise, |bound| weighted_noise(&observations, motion, &tangent, &nu, bound))
 }
 
 /// What to say where fewer than `least` points are usable, of which so many have a finite place: the others

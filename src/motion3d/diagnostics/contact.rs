@@ -2,13 +2,11 @@
 
 use crate::error::Result;
 use crate::math::Real;
-use crate::motion3d::model::camera::Intrinsics;
-use crate::motion3d::model::derotation::{Derotation, MidpointDepth};
-use crate::motion3d::model::input::{Placement, check_field};
+use crate::motion3d::model::input::{Intrinsics, Placement, check_field};
 use crate::motion3d::model::observations::Row;
 use crate::motion3d::model::result::{CommonEffect, UncertainMotion};
-use crate::motion3d::model::rows::{Matrix5, Vector5};
-use crate::motion3d::model::whitening::{plane_row, turned_row};
+use crate::motion3d::model::rows::{Derotation, Matrix5, MidpointDepth, Vector5};
+use crate::motion3d::model::whitening::plane_row;
 use crate::parallel::Threads;
 use crate::types::{FlowField, Status};
 use nalgebra::{Matrix2, Matrix2x3, RowVector2, Vector2, Vector3};
@@ -166,10 +164,7 @@ fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, turn: Option<&De
     let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
     let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
     let (at, covariance) = ([x as f64, y as f64], Matrix2::new(uu, uv, uv, vv));
-    let row = match turn {
-        Some(turn) => turned_row(at, [u, v], &covariance, Some(camera), turn),
-        None => plane_row(at, [u, v], &covariance, Some(camera), Placement::Start),
-    };
+    let row = plane_row(at, [u, v], &covariance, Some(camera), (Placement::Start, turn));
     row.map(|(row, _)| row)
 }
 

@@ -264,9 +264,9 @@ pub(crate) fn bent(observations: &Observations, s2: &[f64], rest: impl Fn(usize)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion3d::model::derotation::Derotation;
     use crate::motion3d::model::input::{Flow, Noise, Placement};
     use crate::motion3d::model::motion::Motion;
+    use crate::motion3d::model::rows::Derotation;
     use crate::motion3d::model::whitening::Whitening;
     use crate::motion3d::tests::scenes::{Scene, W};
 

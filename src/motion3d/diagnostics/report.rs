@@ -5,18 +5,17 @@ use super::correlated_noise::correlated_rotation_covariance;
 use super::rotation_only::RotationOnly;
 use super::rotation_prior::rotation_contradiction;
 use super::solution::{Solution, rotation_shift};
-use crate::motion3d::kernels::{Depths, depths, equations};
-use crate::motion3d::model::camera::to_plane;
-use crate::motion3d::model::derotation::MidpointDepth;
-use crate::motion3d::model::input::Flow;
+use crate::motion3d::kernels::{Depths, Equations, depths, equations};
+use crate::motion3d::model::input::{Flow, to_plane};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::MotionOptions;
 use crate::motion3d::model::result::{MotionEstimate, Status, axes, nested};
+use crate::motion3d::model::rows::{Matrix5, MidpointDepth};
 use crate::motion3d::robust;
 use crate::motion3d::robust::Consensus;
 use crate::motion3d::solver::covariance::{direction_deviation, plugged};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, Vector3};
 use rayon::prelude::*;
 
 /// Fewest points for which a thread pays.
@@ -44,22 +43,13 @@ pub(crate) fn report(
 ) -> MotionEstimate {
     let mut out = MotionEstimate::nothing(flow.len(), solution.status, noise_std);
     let motion = &solution.motion;
-    out.motion = *motion;
+    let here = equations(inliers, motion, &solution.tangent, None);
+    set_motion(&mut out, motion, &solution.tangent, solution.covariance.as_ref(), &here);
     out.likelihood = solution.likelihood;
     out.alternatives.clone_from(&solution.alternatives);
     out.efficient = solution.smooth.is_some();
     out.fell_back = solution.fell_back;
-    out.tangent = axes(&solution.tangent);
     out.common = solution.common;
-    if let Some(covariance) = &solution.covariance {
-        out.covariance = nested(covariance);
-        out.direction_std = direction_deviation(covariance);
-        out.rotation_std = std::array::from_fn(|i| covariance[(2 + i, 2 + i)].sqrt());
-    }
-    let here = equations(inliers, motion, &solution.tangent, None);
-    if let Some(plugged) = plugged(&here.h, &here.p) {
-        out.bound = nested(&plugged.bound);
-    }
     let mut seen = depths(all, motion);
     scatter(&mut out.residuals, all, |k| seen.e[k]);
     let half_way = half_way(all, motion);
@@ -79,6 +69,25 @@ pub(crate) fn report(
     }
     contact(&mut out, all, inliers, &seen, solution);
     out
+}
+
+/// A motion with its covariance, where that is known, and its bound by the equations there.
+pub(crate) fn set_motion(
+    out: &mut MotionEstimate,
+    motion: &Motion,
+    tangent: &Matrix2x3<f64>,
+    covariance: Option<&Matrix5>,
+    here: &Equations,
+) {
+    (out.motion, out.tangent) = (*motion, axes(tangent));
+    if let Some(covariance) = covariance {
+        out.covariance = nested(covariance);
+        out.direction_std = direction_deviation(covariance);
+        out.rotation_std = std::array::from_fn(|i| covariance[(2 + i, 2 + i)].sqrt());
+    }
+    if let Some(plugged) = plugged(&here.h, &here.p) {
+        out.bound = nested(&plugged.bound);
+    }
 }
 
 /// Inverse depths and their variances for times to contact, by source: the smoothed ones where there are any,

@@ -4,8 +4,7 @@
 use super::correlated_noise::{Weighted, correlated_covariance};
 use super::rotation_prior::{CovarianceParts, contradiction};
 use crate::motion3d::kernels::{depths, equations, information, slopes};
-use crate::motion3d::model::camera::to_plane;
-use crate::motion3d::model::input::Flow;
+use crate::motion3d::model::input::{Flow, to_plane};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::CommonErrors;

@@ -13,8 +13,9 @@ use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::robust::CompetingMotion;
 use crate::motion3d::solver::covariance::{DETERMINED, direction_deviation};
 use crate::motion3d::solver::likelihood::SAME;
+use crate::motion3d::solver::refine::{StoppingCriteria, descend};
 use crate::motion3d::solver::starts::{SEARCHED, sample};
-use nalgebra::SymmetricEigen;
+use nalgebra::{Matrix2x3, SymmetricEigen};
 use std::borrow::Cow;
 
 /// Below so many points several motions may explain them exactly.
@@ -217,44 +218,16 @@ pub(crate) fn determined(observations: &Observations, motion: &Motion) -> bool {
     SymmetricEigen::new(relative).eigenvalues.min() > DETERMINED
 }
 
-/// Most steps, and the length of one that is not worth another, rad.
-pub(crate) const STEPS: usize = 30;
-
-pub(crate) const STEP: f64 = 1e-7;
-
 /// Squared standard deviations by which the opposite must be worse to be excluded: a chance of about 1 in
 /// 100.
 pub(crate) const SURE: f64 = 9.0;
 
 /// The most likely motion near `start` that has no depth behind the camera, and its cost.
 pub(crate) fn in_front(observations: &Observations, start: &Motion) -> (Motion, f64) {
-    let equations = |motion: &Motion| front_equations(observations, motion, &tangents(&motion.u()));
-    let (mut motion, mut damping) = (*start, 1e-4);
-    let mut here = equations(&motion);
-    for _ in 0..STEPS {
-        let (mut h, gradient, cost) = here;
-        // The last term keeps undetermined directions where they are.
-        let floor = 1e-12 * h.trace();
-        for i in 0..5 {
-            h[(i, i)] += damping * h[(i, i)] + floor;
-        }
-        let Some(step) = h.cholesky().map(|factor| factor.solve(&gradient)) else { break };
-        if !step.iter().all(|value| value.is_finite()) {
-            break;
-        }
-        let next = motion.stepped(&tangents(&motion.u()), &step);
-        let there = equations(&next);
-        if there.2 <= cost {
-            (motion, here) = (next, there);
-            damping *= 0.1;
-        } else {
-            damping *= 10.0;
-        }
-        if step.norm() < STEP || damping > 1e9 {
-            break;
-        }
-    }
-    (motion, here.2)
+    let effort = StoppingCriteria { steps: 30, tolerance: 1e-7, deviations: 0.0 };
+    let sums = |motion: &Motion, tangent: &Matrix2x3<f64>| front_equations(observations, motion, tangent);
+    let found = descend(*start, effort, observations.n, sums);
+    (found.motion, found.equations.cost)
 }
 
 /// The opposite of a motion, with the rotation that suits it best and how much less likely it is, in squared

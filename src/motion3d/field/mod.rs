@@ -1,23 +1,20 @@
 //! Entry point for flow fields: selects points or windows of a field and estimates their motion with the
 //! field's own covariances.
 //!
-//! `points` takes the estimates of a grid, `patches` fits one affine flow to each of several windows.
+//! Points are estimates of a grid; `patches` fits one affine flow to each of several windows.
 
 mod patches;
-mod points;
 
 pub use patches::{FieldPatches, field_patches};
-pub use points::{FieldPoints, field_points};
 
 use super::estimate::estimate_motion;
-use super::model::camera::Intrinsics;
-use super::model::input::{Flow, Noise};
+use super::model::input::{Flow, Intrinsics, Noise, check_field};
 use super::model::options::{CommonErrors, MotionOptions};
 use super::model::result::MotionEstimate;
 use super::patches::estimate_patch_motion;
 use crate::error::{Error, Result};
 use crate::math::{Real, median, quantile};
-use crate::types::{FlowField, Rect, Status};
+use crate::types::{FlowField, Rect, SamplingGrid, Status};
 use nalgebra::{Matrix2, Vector2};
 
 /// Standard deviation of the flow's common displacement, in those of one point: in rendered rooms, by both
@@ -30,6 +27,18 @@ const SHARPEST_SHARE: f64 = 0.25;
 
 /// About so many sites of a field are used for its common errors.
 const COMMON_ERROR_SITES: f64 = 4000.0;
+
+/// Distance in correlation lengths from which on errors share no window. On a recorded drive a fifth of them
+/// is still correlated (`benchmarks/tables/motion3d_drive.py`); the motion's covariance sums that.
+const INDEPENDENT: f64 = 4.0;
+
+/// Default spacing in correlation lengths, and the least, px: of farther points there are fewer, closer ones
+/// add little.
+const DEFAULT_SPACING: f64 = 2.0;
+const MIN_SPACING: f64 = 8.0;
+
+/// Points of a region below which the default grid is made finer.
+const MIN_REGION_POINTS: usize = 30;
 
 /// Which points of a field are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -47,6 +56,30 @@ pub struct FieldOptions {
     /// Side of square windows, px, each of which becomes one patch with six numbers; not with `spacing` and
     /// `most`. Default: points.
     pub patches: Option<usize>,
+}
+
+/// Points with their flow and its covariance, as [`Flow::Plane`](crate::motion3d::Flow::Plane) and
+/// [`Noise::Covariances`](crate::motion3d::Noise::Covariances) take them.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FieldPoints {
+    /// Pixels.
+    pub points: Vec<[f64; 2]>,
+    /// Their flow, px/frame.
+    pub flow: Vec<[f64; 2]>,
+    /// Its covariances, 4 values a point, px^2; of points closer than independent ones times what they share,
+    /// `4 pi l^2 / spacing^2`.
+    pub covariances: Vec<f64>,
+    /// How many points share one error: what the covariances are multiplied with. For
+    /// [`MotionOptions::points_per_independent_sample`](crate::motion3d::MotionOptions).
+    pub points_per_independent_sample: f64,
+    /// How far errors of neighbours go together, px: the field's own. For
+    /// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions).
+    pub correlation_length: f64,
+    /// What the flow of the whole field may have in common, estimated from its covariances. For
+    /// [`MotionOptions::common`](crate::motion3d::MotionOptions).
+    pub common: CommonErrors,
+    /// The spacing that came out of the options, px.
+    pub spacing: f64,
 }
 
 /// The motion of a field with the points that it was estimated from.
@@ -92,30 +125,93 @@ pub fn estimate_field_motion<T: Real>(
     Ok(FieldMotion { estimate, points: found.points, spacing: found.spacing })
 }
 
+/// Takes every so manieth valid estimate of a field.
+///
+/// Windowed estimates share pixels, and where they do their errors go together over the correlation length
+/// `l`, as `exp(-d^2 / (4 l^2))`: taken for independent, close points would make the motion's covariance too
+/// small. Closer than 4 `l` they get their covariance times `4 pi l^2 / spacing^2`, the number of points on
+/// the area over which errors are one. What goes together farther than that is for
+/// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions).
+///
+/// A list of points is taken whole.
+///
+/// # Errors
+/// [`Error::Argument`] for a field without covariance or with a pixel pitch, and for a spacing that is not
+/// positive.
+pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Result<FieldPoints> {
+    check_field(field)?;
+    let correlation_length = field.layout.correlation_length;
+    let mut spacing = options.spacing.unwrap_or(MIN_SPACING.max(DEFAULT_SPACING * correlation_length));
+    if !(spacing.is_finite() && spacing > 0.0) {
+        return Err(Error::argument("spacing", "a positive number", spacing));
+    }
+    let (mut step, mut points_per_independent_sample) = (1, 1.0);
+    if let SamplingGrid::Grid { stride, .. } = field.layout.sites {
+        let steps = |px: f64| ((px / stride as f64).ceil() as usize).max(1);
+        // Of points closer than one correlation length neither chance nor outliers can be judged.
+        let finest = steps(correlation_length);
+        step = steps(spacing).max(finest);
+        let count = |step: usize| site_pixels(field, step).filter(|(_, at)| is_within(options.region, *at)).count();
+        if options.spacing.is_none() && options.region.is_some() {
+            step = (finest..=step).rev().find(|&step| count(step) >= MIN_REGION_POINTS).unwrap_or(finest);
+        }
+        while options.most.is_some_and(|most| count(step) > most.max(1)) {
+            step += 1;
+        }
+        spacing = (step * stride) as f64;
+        if spacing < INDEPENDENT * correlation_length {
+            let shared = 4.0 * std::f64::consts::PI * (correlation_length / spacing).powi(2);
+            points_per_independent_sample = shared.max(1.0);
+        }
+    }
+    let common = common_errors(field);
+    let mut out =
+        FieldPoints { points_per_independent_sample, correlation_length, common, spacing, ..FieldPoints::default() };
+    for (site, at) in site_pixels(field, step) {
+        let excluded = options.excluded.is_some() && is_within(options.excluded, at);
+        if excluded || !is_within(options.region, at) {
+            continue;
+        }
+        let Some((flow, covariance)) = measurement(field, site) else { continue };
+        // Rounded, that of an edge may be none.
+        if covariance.cholesky().is_none() {
+            continue;
+        }
+        out.points.push([at.0 as f64, at.1 as f64]);
+        out.flow.push(flow.into());
+        out.covariances.extend((covariance * points_per_independent_sample).iter());
+    }
+    Ok(out)
+}
+
+/// Every `step`-th site of both axes, from half a step on, and its pixel.
+fn site_pixels<T>(field: &FlowField<T>, step: usize) -> impl Iterator<Item = (usize, (usize, usize))> + '_ {
+    let columns = move |row: usize| {
+        let site = move |column: usize| (row * field.width + column, field.layout.sites.pixel(column, row));
+        (step / 2..field.width).step_by(step).map(site)
+    };
+    (step / 2..field.height).step_by(step).flat_map(columns)
+}
+
 /// Whether a pixel lies in the region, which is everything where there is none.
-fn is_within(region: Option<Rect>, x: usize, y: usize) -> bool {
+fn is_within(region: Option<Rect>, (x, y): (usize, usize)) -> bool {
     region.is_none_or(|r| (r.x..r.x + r.width).contains(&x) && (r.y..r.y + r.height).contains(&y))
 }
 
-/// Flow `(u, v, u_x, v_x, u_y, v_y)` and the covariance of `(u, v)` at a site, if they are valid.
-fn measurement<T: Real>(field: &FlowField<T>, site: usize) -> Option<([f64; 6], [[f64; 2]; 2])> {
+/// The flow and its covariance at a site, if they are valid.
+fn measurement<T: Real>(field: &FlowField<T>, site: usize) -> Option<(Vector2<f64>, Matrix2<f64>)> {
     let valid = field.status[site].is_valid() && field.status[site] != Status::Inconsistent;
     let [[uu, uv, ..], [vu, vv, ..], ..] = field.covariance_at(site).filter(|_| valid)?;
-    Some((field.affine(site).to_array().map(Real::to_f64), [[uu, uv], [vu, vv]]))
+    let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
+    let uv = 0.5 * (uv + vu);
+    Some((Vector2::new(u, v), Matrix2::new(uu, uv, uv, vv)))
 }
 
 /// Common errors of a whole field: an object that moves little in the picture does not determine the scale
 /// error of flow.
 fn common_errors<T: Real>(field: &FlowField<T>) -> CommonErrors {
     let step = ((field.len() as f64 / COMMON_ERROR_SITES).sqrt() as usize).max(1);
-    let sites = (0..field.height)
-        .step_by(step)
-        .flat_map(|row| (0..field.width).step_by(step).map(move |column| row * field.width + column));
-    let flow = |site: usize| {
-        let ([u, v, ..], covariance) = measurement(field, site)?;
-        Some((Vector2::new(u, v), Matrix2::from_fn(|i, j| covariance[i][j])))
-    };
-    common_errors_of(sites.filter_map(flow))
+    common_errors_of(site_pixels(field, step).filter_map(|(site, _)| measurement(field, site)))
 }
 
 /// Common errors of points with flow and covariance: the scale is off by what would be the whole error of the
@@ -138,6 +234,7 @@ fn common_errors_of(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::types::FieldLayout;
 
     #[test]
     fn common_errors_are_estimated_from_the_sharpest_points() {
@@ -147,5 +244,79 @@ mod tests {
         assert!((common.scale - (2.0f64 / 2025.0).sqrt()).abs() < 1e-12, "{common:?}");
         assert!((common.offset - BIAS_PER_NOISE * 0.2).abs() < 1e-12, "{common:?}");
         assert_eq!(common_errors_of(std::iter::empty()).scale, 1.0);
+    }
+
+    fn field() -> FlowField<f32> {
+        let layout = FieldLayout {
+            frame_size: (60, 40),
+            sites: SamplingGrid::default(),
+            model: "affine".into(),
+            parameters: crate::types::MOTION_NAMES.map(String::from).to_vec(),
+            frame_period: None,
+            pixel_pitch: (1.0, 1.0),
+            frame_index: 0,
+            correlation_length: 5.0,
+        };
+        let mut field = FlowField::empty(layout, true).unwrap();
+        field.status.fill(Status::Ok);
+        field.motion.fill(0.5);
+        // Of u and v alone, which are independent.
+        let (size, covariance) = (field.len(), field.covariance.as_mut().unwrap());
+        covariance.fill(0.25);
+        covariance[size..2 * size].fill(0.0);
+        field
+    }
+
+    #[test]
+    fn points_are_as_far_apart_as_errors_go_together() {
+        let mut field = field();
+        let points = field_points(&field, &FieldOptions::default()).unwrap();
+        assert_eq!((points.spacing, points.points.len()), (10.0, 24));
+        assert_eq!((points.points[0], points.points[1], points.flow[3]), ([5.0, 5.0], [15.0, 5.0], [0.5, 0.5]));
+        let few = FieldOptions { most: Some(7), ..FieldOptions::default() };
+        assert_eq!(field_points(&field, &few).unwrap().points.len(), 6);
+        let dense = FieldOptions { spacing: Some(5.0), ..FieldOptions::default() };
+        let covariance = field_points(&field, &dense).unwrap().covariances[0];
+        assert!((covariance / 0.25 - 4.0 * std::f64::consts::PI).abs() < 1e-12, "{covariance}");
+        assert!((points.covariances[0] / 0.25 - std::f64::consts::PI).abs() < 1e-12, "{}", points.covariances[0]);
+        assert_eq!(field_points(&field, &dense).unwrap().points_per_independent_sample, covariance / 0.25);
+        assert_eq!(
+            (points.points_per_independent_sample, points.correlation_length),
+            (points.covariances[0] / 0.25, 5.0)
+        );
+        let denser = FieldOptions { spacing: Some(1.0), ..FieldOptions::default() };
+        assert_eq!(field_points(&field, &denser).unwrap().spacing, 5.0);
+        let far = FieldOptions { spacing: Some(20.0), ..FieldOptions::default() };
+        let far = field_points(&field, &far).unwrap();
+        assert_eq!((far.points_per_independent_sample, &far.covariances[..4]), (1.0, &[0.25, 0.0, 0.0, 0.25][..]));
+        field.status[5 * 60 + 5] = Status::Inconsistent;
+        assert_eq!(field_points(&field, &FieldOptions::default()).unwrap().points[0], [15.0, 5.0]);
+    }
+
+    #[test]
+    fn a_region_has_its_own_grid_and_its_own_most() {
+        let field = field();
+        let region = Some(Rect { x: 10, y: 5, width: 40, height: 30 });
+        let inside = |options: FieldOptions| field_points(&field, &options).unwrap();
+        let found = inside(FieldOptions { region, ..FieldOptions::default() });
+        assert!(found.points.len() >= 30 && found.spacing < 10.0, "{} {}", found.points.len(), found.spacing);
+        assert!(found.covariances[0] > 0.25);
+        // As many as are wanted in the region, regardless of the rest of the field.
+        let few = inside(FieldOptions { region, most: Some(12), ..FieldOptions::default() });
+        assert!((9..=12).contains(&few.points.len()), "{}", few.points.len());
+        let rest = inside(FieldOptions { excluded: region, ..FieldOptions::default() });
+        assert_eq!((rest.points.len(), rest.flow.len(), rest.covariances.len()), (12, 12, 48));
+        assert!(rest.points.iter().all(|&[x, y]| !is_within(region, (x as usize, y as usize))));
+        // A given spacing stays.
+        let given = inside(FieldOptions { region, spacing: Some(10.0), ..FieldOptions::default() });
+        assert_eq!((given.spacing, given.points.len()), (10.0, 12));
+    }
+
+    #[test]
+    fn fields_without_a_covariance_are_refused() {
+        let bare = FlowField { covariance: None, ..field() };
+        assert!(field_points(&bare, &FieldOptions::default()).unwrap_err().to_string().starts_with("field: "));
+        let wrong = FieldOptions { spacing: Some(0.0), ..FieldOptions::default() };
+        assert!(field_points(&field(), &wrong).unwrap_err().to_string().starts_with("spacing: "));
     }
 }

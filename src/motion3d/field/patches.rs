@@ -1,11 +1,10 @@
 //! A flow field cut into windows, each of them one patch with six numbers.
 
-use super::{common_errors, is_within};
+use super::{common_errors, is_within, site_pixels};
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::motion3d::diagnostics::correlated_noise::area;
-use crate::motion3d::model::camera::Intrinsics;
-use crate::motion3d::model::input::check_field;
+use crate::motion3d::model::input::{Intrinsics, check_field};
 use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::patches::AffinePatches;
 use crate::parallel::Threads;
@@ -15,13 +14,6 @@ use rayon::prelude::*;
 
 /// Least side of a window, px: six numbers of less add little to those of its pixels.
 const MIN_WINDOW_SIDE: usize = 8;
-
-/// The share of a window's sites that must be valid, for its middle not to lie beside what is seen of it.
-const SEEN: f64 = 0.5;
-
-/// The least square of a pivot of a covariance, in shares of its own variance: below, rounding of single
-/// precision made it.
-const ROUNDED: f64 = 1e-6;
 
 /// Patches of a field, as [`AffinePatches`] takes them.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -124,12 +116,9 @@ impl Windows {
     /// Valid sites of each window.
     fn pixels_of_windows<T: Real>(&self, field: &FlowField<T>, region: Option<Rect>) -> Vec<Vec<usize>> {
         let mut out = vec![Vec::new(); self.columns * self.rows];
-        for site in 0..field.len() {
-            if !field.status[site].is_valid() || field.status[site] == Status::Inconsistent {
-                continue;
-            }
-            let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
-            if let Some(window) = self.of((x, y)).filter(|_| is_within(region, x, y)) {
+        for (site, at) in site_pixels(field, 1).filter(|(_, at)| is_within(region, *at)) {
+            let valid = field.status[site].is_valid() && field.status[site] != Status::Inconsistent;
+            if let Some(window) = self.of(at).filter(|_| valid) {
                 out[window].push(site);
             }
         }
@@ -157,7 +146,8 @@ impl Windows {
             SamplingGrid::Grid { stride, .. } => (stride * stride) as f64,
             SamplingGrid::Points(_) => whole / sums.count as f64,
         };
-        if (sums.count as f64) * each < SEEN * whole {
+        // Of less than half the middle may lie beside what is seen.
+        if (sums.count as f64) * each < 0.5 * whole {
             return None;
         }
         let length = field.layout.correlation_length;
@@ -183,7 +173,8 @@ impl Sums {
     fn add(&mut self, six: &Vector6<f64>, covariance: &Matrix6<f64>, distance: [f64; 2]) {
         let Some(factor) = covariance.cholesky() else { return };
         let l = factor.l();
-        let rounded = |i: usize| l[(i, i)].powi(2) < ROUNDED * covariance[(i, i)];
+        // The square of a pivot, in shares of its own variance, that rounding of single precision made.
+        let rounded = |i: usize| l[(i, i)].powi(2) < 1e-6 * covariance[(i, i)];
         if !six.iter().all(|value| value.is_finite()) || (0..6).any(rounded) {
             return;
         }

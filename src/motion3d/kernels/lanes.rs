@@ -108,7 +108,7 @@ fn totals<V: Lanes<Scalar = f64>, const N: usize>(sums: &[V; N]) -> SVector<f64,
 }
 
 /// The sums of one Gauss-Newton step at a motion.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Equations {
     /// `H = sum D(nu^)^t D(nu^)`.
     pub h: Matrix5,

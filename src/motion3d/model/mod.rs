@@ -1,11 +1,9 @@
 //! What is given and what is estimated, in the order of the data.
 //!
-//! `input` (points, flow, noise), `camera` and `options` hold what is given. `rows` writes a point's flow as
-//! `f = nu G u + R w`, `derotation` does so for finite displacements; `whitening` scales the rows to unit
-//! noise and `observations` holds them as planes. `motion` is what is estimated, `result` what is returned.
+//! `input` (points, flow, noise, camera) and `options` hold what is given. `rows` writes a point's flow as
+//! `f = nu G u + R w`, finite displacements too; `whitening` scales the rows to unit noise and `observations`
+//! holds them as planes. `motion` is what is estimated, `result` what is returned.
 
-pub(crate) mod camera;
-pub(crate) mod derotation;
 pub(crate) mod input;
 pub(crate) mod motion;
 pub(crate) mod observations;

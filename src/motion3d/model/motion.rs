@@ -1,8 +1,7 @@
 //! A rigid motion: the flow it makes, its finite displacement, its essential matrix.
 
-use super::camera::Intrinsics;
-use super::derotation::Derotation;
-use super::rows::{AffineRows, Rows, Vector5, cross_matrix};
+use super::input::Intrinsics;
+use super::rows::{AffineRows, Derotation, Rows, Vector5, cross_matrix};
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 
 /// A rigid motion of the scene relative to the camera over one frame: `X_dot = u + w x X`.
@@ -12,16 +11,6 @@ pub struct Motion {
     pub translation: [f64; 3],
     /// Rotation rate `w`, rad/frame.
     pub rotation: [f64; 3],
-}
-
-/// A screen: where points lie and how their flow is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Projection {
-    /// The plane at distance 1: `eta = (x, y, 1)`, `nu = 1 / Z`.
-    #[default]
-    Plane,
-    /// The unit sphere: `eta` is the bearing, `nu = 1 / range`.
-    Sphere,
 }
 
 impl Motion {
@@ -112,22 +101,10 @@ impl Motion {
         std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
     }
 
-    /// The displacement of the whole frame in units of the path's length: `t = V(w) u`, so that `X' = Rot X +
-    /// t / nu` for a point with `|u| = 1`.
-    ///
-    /// `V = I + (1 - cos a) / a^2 [w]x + (a - sin a) / a^3 [w]x^2`, `a = |w|`.
+    /// The displacement of the whole frame in units of the path's length: `t`, so that `X' = Rot X + t / nu`
+    /// for a point with `|u| = 1`.
     pub fn displacement(&self) -> [f64; 3] {
-        let (w, u) = (self.w(), self.u());
-        let a = w.norm();
-        // Below 1e-4 the series is exact to double precision where the closed form cancels.
-        let (first, second) = if a < 1e-4 {
-            (0.5 - a * a / 24.0, 1.0 / 6.0 - a * a / 120.0)
-        } else {
-            // 1 - cos a = 2 sin^2 (a / 2), which does not cancel.
-            (2.0 * ((0.5 * a).sin() / a).powi(2), (a - a.sin()) / (a * a * a))
-        };
-        let once = w.cross(&u);
-        (u + once * first + w.cross(&once) * second).into()
+        Derotation::new(&self.w()).frame_translation(&self.u()).into()
     }
 
     /// The essential matrix `[t]x Rot` of the frame, row by row: `eta'^t E eta = 0` for the two views'

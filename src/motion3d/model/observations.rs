@@ -1,7 +1,6 @@
 //! What was measured, whitened once: two rows of `G`, `R` and `f` for every usable point, as planes.
 
-use super::derotation::Derotation;
-use super::rows::{Matrix5, Rows, Vector5};
+use super::rows::{Derotation, Matrix5, Rows, Vector5};
 use crate::math::{median, quantile};
 use crate::simd::Level;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, SymmetricEigen, Vector2, Vector3};
@@ -18,15 +17,8 @@ const ALIGN: usize = 8;
 /// Planes of an [`Observations`].
 pub(crate) const PLANES: usize = 14;
 
-/// `|G u| / |G|` below which a point sits on the epipole and says nothing.
-const EPIPOLE: f64 = 1e-9;
-
 /// Residuals below this share of the flow are rounding.
 pub(crate) const ROUNDING: f64 = 1e-11;
-
-/// Points whose noise ellipses are measured, and the quantile of their ratios that is used.
-const MAX_RATIO_POINTS: usize = 1000;
-const FAR_FROM_ROUND: f64 = 0.9;
 
 /// Ratios of a point's standard deviations along its two axes at which minima are looked for one after the
 /// other, where the points' own are larger: the smaller a point's noise along one axis, the narrower
@@ -85,15 +77,15 @@ impl Row {
     pub fn whitened(rows: &Rows, flow: Vector2<f64>, covariance: &Matrix2<f64>) -> Option<Self> {
         let whiten = unit(covariance)?;
         let row = Self { g: whiten * rows.g, r: whiten * rows.r, f: whiten * flow };
-        row.values().iter().all(|value| value.is_finite()).then_some(row)
+        (0..PLANES).all(|p| row.value(p).is_finite()).then_some(row)
     }
 
-    fn values(&self) -> [f64; PLANES] {
-        std::array::from_fn(|p| match p {
+    fn value(&self, p: usize) -> f64 {
+        match p {
             0..6 => self.g[(p / 3, p % 3)],
             6..12 => self.r[((p - 6) / 3, p % 3)],
             _ => self.f[p - 12],
-        })
+        }
     }
 }
 
@@ -108,23 +100,12 @@ impl Observations {
         let n = rows.len();
         let stride = n.next_multiple_of(ALIGN);
         let mut planes = vec![0.0; PLANES * stride];
-        let mut parts: Vec<_> = planes.chunks_exact_mut(stride.max(1)).map(|plane| plane.chunks_mut(CHUNK)).collect();
-        let mut chunks: Vec<Vec<&mut [f64]>> = Vec::with_capacity(n.div_ceil(CHUNK));
-        for _ in 0..n.div_ceil(CHUNK) {
-            chunks.push(parts.iter_mut().filter_map(Iterator::next).collect());
-        }
-        // One sum a chunk, added up in their order: the same on any number of threads.
-        let sum = |(rows, part): (&[Row], &mut Vec<&mut [f64]>)| {
-            let mut size = 0.0;
-            for (k, row) in rows.iter().enumerate() {
-                part.iter_mut().zip(row.values()).for_each(|(plane, value)| plane[k] = value);
-                size += row.g.norm_squared();
-            }
-            size
-        };
-        let sizes: Vec<f64> = rows.par_chunks(CHUNK).zip(&mut chunks).map(sum).collect();
-        let size: f64 = sizes.iter().sum();
-        let floor = EPIPOLE * EPIPOLE * size / (2 * n.max(1)) as f64;
+        planes.par_chunks_exact_mut(stride.max(1)).enumerate().for_each(|(p, plane)| {
+            plane.iter_mut().zip(rows).for_each(|(to, row)| *to = row.value(p));
+        });
+        let size: f64 = planes[..6 * stride].iter().map(|value| value * value).sum();
+        // Where `|G u| / |G|` is below 1e-9 a point sits on the epipole.
+        let floor = 1e-18 * size / (2 * n.max(1)) as f64;
         Self {
             n,
             stride,
@@ -186,11 +167,11 @@ impl Observations {
     }
 
     /// How many times as large noise is along one axis as along the other, of all but a tenth of the points
-    /// at most.
+    /// at most, by a thousand of them.
     pub fn longest(&self) -> f64 {
-        let few = (0..self.n).step_by(self.n.div_ceil(MAX_RATIO_POINTS).max(1));
+        let few = (0..self.n).step_by(self.n.div_ceil(1000).max(1));
         let mut stretches: Vec<f64> = few.map(|k| self.stretch(k).0).collect();
-        quantile(&mut stretches, FAR_FROM_ROUND).unwrap_or(0.0)
+        quantile(&mut stretches, 0.9).unwrap_or(0.0)
     }
 
     /// The same points where no point's noise is more than `ratio` times as large along one axis as along the
@@ -203,7 +184,7 @@ impl Observations {
                 let row = self.row(k);
                 let less = Matrix2::identity() - axis * axis.transpose() * (1.0 - ratio / stretch);
                 let rounder = Row { g: less * row.g, r: less * row.r, f: less * row.f };
-                rounder.values().iter().enumerate().for_each(|(p, value)| out.planes[p * self.stride + k] = *value);
+                (0..PLANES).for_each(|p| out.planes[p * self.stride + k] = rounder.value(p));
             }
         }
         out
@@ -300,9 +281,6 @@ impl KnownRotation {
     }
 }
 
-/// Noise of flow that is exactly zero, in its unit.
-pub(crate) const MIN_NOISE: f64 = 1e-100;
-
 /// Points in units of their noise, and that in the flow's unit.
 pub(crate) struct Scaled {
     pub observations: Observations,
@@ -316,7 +294,8 @@ pub(crate) struct Scaled {
 impl Scaled {
     /// Takes `noise_std` in units of the present noise to be the noise.
     pub fn take(&mut self, noise_std: f64) {
-        let noise_std = noise_std.max(ROUNDING * self.observations.median_flow()).max(MIN_NOISE);
+        // Flow that is exactly zero has some noise, too.
+        let noise_std = noise_std.max(ROUNDING * self.observations.median_flow()).max(1e-100);
         if noise_std.is_finite() {
             self.observations.rescale(1.0 / noise_std);
             self.noise_std *= noise_std;

@@ -1,7 +1,7 @@
 //! What is given and how it is worked on.
 
-use super::input::{Flow, Noise, Placement};
-use super::motion::{Motion, Projection};
+use super::input::{Flow, Noise, Placement, Projection};
+use super::motion::Motion;
 use super::observations::KnownRotation;
 use super::result::{CommonEffect, Moved};
 use super::rows::{Matrix5, Vector5};

@@ -1,6 +1,6 @@
 //! The result of an estimate.
 
-use super::camera::Intrinsics;
+use super::input::Intrinsics;
 use super::motion::Motion;
 use super::rows::{Matrix5, Vector5};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, RowVector2, SMatrix, SVector, Vector2};

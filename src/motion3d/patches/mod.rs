@@ -3,37 +3,32 @@
 //! It pays for few, large patches seen through a long lens; noisy slants used as weights make maximum
 //! likelihood worse than flow alone, so that they are shrunk.
 //!
-//! `derotation` takes the rotation out of displacements, `system` has the equations, `shrinkage` solves them
-//! with shrunk slants, `bootstrap` tests the covariance of few patches. `status` and `report` follow.
+//! `system` has the equations, `shrinkage` solves them with shrunk slants and tests the covariance of few
+//! patches, `report` assembles the result and judges it.
 
-mod bootstrap;
-mod derotation;
 mod report;
 mod shrinkage;
-mod status;
 mod system;
 
 use crate::error::{Error, Result};
 use crate::math::by_chance;
 use crate::math::random::CounterRng;
-use crate::motion3d::bound::{MotionBound, check_truth, not_determined, too_few};
-use crate::motion3d::diagnostics::rotation_only::RotationOnly;
-use crate::motion3d::model::camera::{Intrinsics, to_plane};
-use crate::motion3d::model::derotation::Derotation;
-use crate::motion3d::model::input::{Noise, Placement, is_covariance, not_covariance};
-use crate::motion3d::model::motion::{Motion, Projection};
+use crate::motion3d::bound::{MotionBound, check_truth, too_few};
+use crate::motion3d::model::input::{
+    Intrinsics, Noise, Placement, Projection, affine_map, is_covariance, not_covariance, to_plane,
+};
+use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::options::{Method, MotionOptions};
 use crate::motion3d::model::result::{CommonEffect, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
-use crate::motion3d::model::rows::tangents;
-use crate::motion3d::model::whitening::floored_covariances;
-use crate::motion3d::solver::covariance::{determined, inverse, plugged};
-use crate::motion3d::solver::starts::{apart, evaluate, sample};
-use bootstrap::wider;
-use derotation::{beforehand, settle, turned_patch};
-use nalgebra::{DMatrix, Matrix3, Vector3};
-use report::{report_motion, turning_report};
-use shrinkage::shrunk;
-use status::{Evidence, judge};
+use crate::motion3d::model::rows::{Derotation, tangents};
+use crate::motion3d::model::whitening::floored;
+use crate::motion3d::solver::covariance::{inverse, plugged};
+use crate::motion3d::solver::finite_rotation::{ROUNDING, ROUNDS};
+use crate::motion3d::solver::refine::Minimum;
+use crate::motion3d::solver::starts::{APART, STARTS, apart, evaluate, sample};
+use nalgebra::{DMatrix, Matrix2, Matrix6, Vector3, Vector6};
+use report::{judge, report_motion, turning_report};
+use shrinkage::{covariance_factor, shrunk};
 use std::collections::HashSet;
 use system::{Patch, System};
 
@@ -50,15 +45,12 @@ pub struct AffinePatches<'a> {
     pub camera: Option<&'a Intrinsics>,
 }
 
-/// Least number of patches for a motion, for a nearly unique one, and for a distribution of surfaces.
+/// Least number of patches for a motion; for a nearly unique one and for a distribution of surfaces.
 const MIN_PATCHES: usize = 2;
 const FEW: usize = 5;
-const SMOOTHED: usize = 5;
 
 /// Most patches that the search over directions looks at.
 const SEARCHED: usize = 200;
-const STARTS: usize = 5;
-const APART: f64 = 12.0;
 
 /// By how much a covariance may have to be inflated for it to describe the shape of the confidence region.
 const NONLINEAR: f64 = 4.0;
@@ -81,40 +73,37 @@ impl AffinePatches<'_> {
         Ok(())
     }
 
-    /// The usable patches, whitened; with a `turn`, as displacements with that rotation taken out of them.
-    fn system(&self, placement: Placement, turn: Option<&Derotation>) -> System {
-        let (mut patches, mut source) = (Vec::new(), Vec::new());
-        for k in 0..self.points.len() {
-            let patch = match turn {
-                Some(turn) => turned_patch(self, k, turn),
-                None => self.patch(k, placement),
-            };
-            if let Some(patch) = patch {
-                patches.push(patch);
-                source.push(k as u32);
-            }
-        }
+    /// The usable patches, whitened; of displacements, with the rotation `w` taken out of both views.
+    fn system(&self, placement: Placement, w: &Vector3<f64>) -> System {
+        let turn = (placement == Placement::Midpoint).then(|| Derotation::new(w));
+        let usable = (0..self.points.len()).filter_map(|k| Some((self.patch(k, turn.as_ref())?, k as u32)));
+        let (patches, source) = usable.unzip();
         System { patches, source }
     }
 
-    fn patch(&self, k: usize, placement: Placement) -> Option<Patch> {
-        let mut m = nalgebra::Vector6::from(self.motion[k]);
-        let mut at = self.points[k];
-        if placement == Placement::Midpoint {
-            at = [at[0] + 0.5 * m[0], at[1] + 0.5 * m[1]];
-            let slopes = nalgebra::Matrix2::new(m[2], m[4], m[3], m[5]);
-            // M_mid = M (I + M / 2)^-1: slopes by the place half way.
-            let slopes = slopes * (nalgebra::Matrix2::identity() + 0.5 * slopes).try_inverse()?;
-            m.fixed_rows_mut::<4>(2).copy_from_slice(slopes.as_slice());
-        }
-        let mut covariance = nalgebra::Matrix6::from_row_slice(&self.covariances[36 * k..36 * (k + 1)]);
+    fn patch(&self, k: usize, turn: Option<&Derotation>) -> Option<Patch> {
+        let (mut m, at) = (Vector6::from(self.motion[k]), self.points[k]);
+        let mut covariance = Matrix6::from_row_slice(&self.covariances[36 * k..36 * (k + 1)]);
+        let mut ends = [at, [at[0] + m[0], at[1] + m[1]]];
         if let Some(camera) = self.camera {
-            let map = camera.affine_scale();
-            at = camera.to_plane(at);
+            let map = affine_map(&camera.scale(), &camera.scale());
             m = map * m;
             covariance = map * covariance * map.transpose();
+            ends = ends.map(|at| camera.to_plane(at));
         }
-        Patch::new(at, &m, &covariance, None)
+        let Some(turn) = turn else { return Patch::new(ends[0], &m, &covariance, None) };
+        let turned = turn.out_of(ends[0], ends[1])?;
+        // The map from one view to the other is I + M to first order: with the slopes D_1, D_2 of what turns
+        // both views it is D_2 (I + M) D_1^-1.
+        let one = Matrix2::identity();
+        let slopes = turned.spread * (one + Matrix2::new(m[2], m[4], m[3], m[5])) * turned.first.try_inverse()? - one;
+        let map = affine_map(&turned.spread, &turned.first);
+        covariance = map * covariance * map.transpose();
+        // M_mid = M (I + M / 2)^-1: slopes by the place half way.
+        let slopes = slopes * (one + 0.5 * slopes).try_inverse()?;
+        m.fixed_rows_mut::<2>(0).copy_from(&turned.left);
+        m.fixed_rows_mut::<4>(2).copy_from_slice(slopes.as_slice());
+        Patch::new(turned.middle, &m, &covariance, Some(turn))
     }
 }
 
@@ -148,117 +137,109 @@ pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOption
         _ => {}
     }
     options.check_common(Projection::Plane)?;
-    let covariances = floored_covariances(patches.covariances, 6);
+    let covariances = floored(patches.covariances.chunks_exact(36).map(Matrix6::from_row_slice).collect());
+    let covariances: Vec<f64> = covariances.iter().flat_map(|given| given.as_slice().to_vec()).collect();
     let patches = AffinePatches { covariances: &covariances, ..*patches };
     Ok(options.threads.check()?.install(|| estimate(&patches, options)))
 }
 
 fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstimate {
-    let points = patches.points;
-    let mut system = beforehand(patches, options);
-    let (used, n) = (system.patches.len(), points.len());
-    if used < MIN_PATCHES {
+    let (n, placement) = (patches.points.len(), options.placement);
+    let mut system = patches.system(placement, &Vector3::zeros());
+    // First the rotation is taken out that explains most of the flow by itself.
+    for _ in 0..if placement == Placement::Midpoint { ROUNDS } else { 0 } {
+        let Some(rotation) = system.rotation_only() else { break };
+        system = patches.system(placement, &rotation.rotation);
+    }
+    if system.patches.len() < MIN_PATCHES {
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     }
-    if let Some(rotation) = explained_by_rotation(&system) {
+    let free = (6 * system.patches.len() - 3) as f64;
+    if let Some(rotation) = system.rotation_only().filter(|rotation| by_chance(rotation.chi2, free)) {
         return turning_report(&system, n, &rotation, &options.systematic_errors(), &to_plane(patches.camera));
     }
     let rng = CounterRng::new(options.random_state);
     let mut minima = match options.initial {
-        Some(initial) => vec![system.refine(&Motion::new(initial.translation, initial.rotation))],
+        Some(initial) => vec![system.refine(&initial.normalized())],
         None => minima(&system, rng),
     };
-    settle(patches, options, &mut system, &mut minima);
+    settle(patches, placement, &mut system, &mut minima);
     let system = &system;
-    let Some(&best) = minima.first() else {
+    let Some(best) = minima.first() else {
         return MotionEstimate::nothing(n, Status::TooFewPoints, 1.0);
     };
-    let tangent = tangents(&best.u());
-    let at_best = system.equations(&best, &tangent, None);
-    let plugged = plugged(&at_best.h, &at_best.p);
-    let wanted = options.method == Method::Efficient || (options.method == Method::Auto && used >= SMOOTHED);
-    let improved = if wanted || plugged.is_none() { shrunk(system, &best) } else { None };
+    let plugged = plugged(&best.equations.h, &best.equations.p);
+    let enough = system.patches.len() >= FEW;
+    let wanted = options.method == Method::Efficient || (options.method == Method::Auto && enough);
+    let improved = if wanted || plugged.is_none() { shrunk(system, &best.motion) } else { None };
     let mut out = MotionEstimate::nothing(n, Status::Ok, 1.0);
     out.fell_back = wanted && improved.is_none();
-    let (mut motion, mut covariance) = (best, plugged.map(|plugged| plugged.likelihood));
+    let (mut motion, mut covariance) = (best.motion, plugged.map(|plugged| plugged.likelihood));
     let mut surfaces = None;
     if let Some(found) = improved {
-        let info = system.equations(&found.motion, &tangents(&found.motion.u()), Some(&found.surfaces)).h;
         if wanted {
             motion = found.motion;
-            covariance = inverse(&info);
-            surfaces = Some(found.surfaces);
-        } else {
-            covariance = inverse(&system.equations(&best, &tangent, Some(&found.surfaces)).h);
         }
+        covariance = inverse(&system.equations(&motion, &tangents(&motion.u()), Some(&found.surfaces)).h);
+        surfaces = wanted.then_some(found.surfaces);
     }
     out.efficient = surfaces.is_some();
-    let depths: Vec<Vector3<f64>> = match &surfaces {
-        Some(surfaces) => surfaces.clone(),
-        None => system.patches.iter().map(|patch| patch.seen(&motion).surface).collect(),
-    };
-    let wider = if plugged.is_some() { wider(system, &motion, &depths, out.efficient, rng.stream(2)) } else { 1.0 };
+    let own = || system.patches.iter().map(|patch| patch.seen(&motion).surface).collect();
+    let depths: Vec<Vector3<f64>> = surfaces.clone().unwrap_or_else(own);
+    let again = |_| covariance_factor(system, &motion, &depths, out.efficient, rng.stream(2));
+    let wider = plugged.as_ref().map_or(1.0, again);
     let displaced = (&system.moved(&motion, &depths), &to_plane(patches.camera));
     let common = |covariance| options.systematic_errors().on(&covariance, &motion, None, displaced);
     out.common = covariance.map_or_else(CommonEffect::default, common);
     covariance = covariance.map(|covariance| covariance * wider + out.common.added());
     let low = plugged.is_none() || wider > NONLINEAR;
-    let planar = report_motion(&mut out, system, &motion, covariance, surfaces.as_deref());
+    report_motion(&mut out, system, &motion, covariance, surfaces.as_deref());
     out.likelihood = Likelihood {
-        motion: best,
+        motion: best.motion,
         covariance: plugged.map_or(UNKNOWN, |plugged| nested(&plugged.likelihood)),
-        tangent: axes(&tangent),
-        cost: at_best.cost,
+        tangent: axes(&best.tangent),
+        cost: best.equations.cost,
     };
-    let evidence = Evidence { minima: &minima, few: places(system, points) < FEW, planar, low };
-    judge(&mut out, system, &evidence, rng.stream(1));
+    // Patches at one place determine no more surfaces than one of less noise.
+    let place = |&k: &u32| patches.points[k as usize].map(f64::to_bits);
+    let places = system.source.iter().map(place).collect::<HashSet<_>>().len();
+    let minima: Vec<Motion> = minima.iter().map(|minimum| minimum.motion).collect();
+    judge(&mut out, system, &minima, places, low, rng.stream(1));
     out
-}
-
-/// Patches at different places: those at one determine no more surfaces, and of no more constraints, than one
-/// of less noise.
-fn places(system: &System, points: &[[f64; 2]]) -> usize {
-    let place = |&k: &u32| points[k as usize].map(f64::to_bits);
-    system.source.iter().map(place).collect::<HashSet<_>>().len()
 }
 
 /// The minima that are reached from the best directions of the half sphere, both signs each, the cheapest
 /// first.
-fn minima(system: &System, rng: CounterRng) -> Vec<Motion> {
+fn minima(system: &System, rng: CounterRng) -> Vec<Minimum> {
     let few = system.subset(&sample(system.patches.len(), SEARCHED, rng));
     let found = evaluate(|u| few.best_rotation(u).map(|(w, cost)| (Motion::of(u, &w), cost)));
     let refined = apart(found, APART, STARTS).into_iter().map(|(start, _)| system.refine(&start));
-    cheapest(system, refined.flat_map(|motion| [motion, motion.reversed()]))
+    let both = refined.flat_map(|minimum| {
+        let motion = minimum.motion.reversed();
+        let tangent = tangents(&motion.u());
+        [minimum, Minimum { motion, tangent, equations: system.equations(&motion, &tangent, None) }]
+    });
+    cheapest(both)
 }
 
 /// Sorted by what residuals and patches behind the camera cost.
-fn cheapest(system: &System, motions: impl Iterator<Item = Motion>) -> Vec<Motion> {
-    let cost = |motion: Motion| {
-        let here = system.equations(&motion, &tangents(&motion.u()), None);
-        (motion, here.cost + here.behind)
-    };
-    let mut minima: Vec<(Motion, f64)> = motions.map(cost).collect();
-    minima.retain(|(_, cost)| cost.is_finite());
-    minima.sort_by(|a, b| a.1.total_cmp(&b.1));
-    minima.into_iter().map(|(motion, _)| motion).collect()
+fn cheapest(minima: impl Iterator<Item = Minimum>) -> Vec<Minimum> {
+    let cost = |minimum: &Minimum| minimum.equations.cost + minimum.equations.behind;
+    let mut minima: Vec<Minimum> = minima.filter(|minimum| cost(minimum).is_finite()).collect();
+    minima.sort_by(|a, b| cost(a).total_cmp(&cost(b)));
+    minima
 }
 
-/// The rotation alone, where chance explains what it leaves.
-fn explained_by_rotation(system: &System) -> Option<RotationOnly> {
-    let found = least_squares(system)?;
-    by_chance(found.chi2, (6 * system.patches.len() - 3) as f64).then_some(found)
-}
-
-fn least_squares(system: &System) -> Option<RotationOnly> {
-    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for patch in &system.patches {
-        normal += patch.r.transpose() * patch.r;
-        right += patch.r.transpose() * patch.f;
+/// Takes the rotation of the likeliest minimum out of displacements, and refines all again, until it stays.
+fn settle(patches: &AffinePatches<'_>, placement: Placement, system: &mut System, minima: &mut Vec<Minimum>) {
+    for _ in 0..if placement == Placement::Midpoint { ROUNDS } else { 0 } {
+        let Some(w) = minima.first().map(|minimum| minimum.motion.w()) else { break };
+        *system = patches.system(placement, &w);
+        *minima = cheapest(minima.iter().map(|minimum| system.refine(&minimum.motion)));
+        if minima.first().is_some_and(|minimum| (minimum.motion.w() - w).norm() < ROUNDING) {
+            break;
+        }
     }
-    let factor = normal.cholesky()?;
-    let rotation = factor.solve(&right);
-    let chi2: f64 = system.patches.iter().map(|patch| (patch.f - patch.r * rotation).norm_squared()).sum();
-    Some(RotationOnly { rotation, covariance: factor.inverse(), chi2 })
 }
 
 /// As [`motion_bound`](crate::motion3d::motion_bound), for six numbers a patch whose true `(nu, nu_x, nu_y)`
@@ -274,7 +255,7 @@ pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces
         let expected = format!("{} surfaces, one for each point", patches.points.len());
         return Err(Error::argument("inv_depth", expected, surfaces.len()));
     }
-    let system = patches.system(Placement::Start, None);
+    let system = patches.system(Placement::Start, &Vector3::zeros());
     if system.patches.len() < MIN_PATCHES {
         let finite = |at: &&[f64; 2]| at.iter().all(|value| value.is_finite());
         return Err(too_few(MIN_PATCHES, patches.points.iter().filter(finite).count()));
@@ -289,8 +270,5 @@ pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces
     let surfaces: Vec<Vector3<f64>> = system.source.iter().map(|&k| surfaces[k as usize].into()).collect();
     let tangent = tangents(&motion.u());
     let truth = system.equations(motion, &tangent, Some(&surfaces));
-    let bound = determined(&truth.h).ok_or_else(not_determined)?;
-    let likelihood = bound + bound * truth.p * bound;
-    let ideal = bound + bound * system.weighted_noise(motion, &tangent, &surfaces, &bound) * bound;
-    Ok(MotionBound::of(&tangent, &bound, &likelihood, &ideal))
+    MotionBound::of(&tangent, &truth.h, &truth.p, |bound| system.weighted_noise(motion, &tangent, &surfaces, bound))
 }

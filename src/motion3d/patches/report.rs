@@ -1,36 +1,35 @@
-//! Assembles the result for patches.
+//! Assembles the result for patches, and finds what else could be true.
 
 use super::system::System;
+use super::{FEW, SEARCHED};
+use crate::math::random::CounterRng;
+use crate::motion3d::diagnostics::confidence_region::PLAUSIBLE;
 use crate::motion3d::diagnostics::contact::Rates;
-use crate::motion3d::diagnostics::report::report_rotation;
+use crate::motion3d::diagnostics::report::{report_rotation, set_motion};
 use crate::motion3d::diagnostics::rotation_only::RotationOnly;
+use crate::motion3d::diagnostics::status::{FAR, SPACING, SURE, WIDE};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::options::CommonErrors;
-use crate::motion3d::model::result::{Alternative, MotionEstimate, Status, axes, nested};
+use crate::motion3d::model::result::{Alternative, MotionEstimate, Status};
 use crate::motion3d::model::rows::{Matrix5, tangents};
-use crate::motion3d::solver::covariance::{direction_deviation, plugged};
+use crate::motion3d::solver::covariance::direction_deviation;
+use crate::motion3d::solver::likelihood::DISTINCT;
+use crate::motion3d::solver::starts::{evaluate, sample};
 use nalgebra::{Matrix2, Vector3};
 
-/// Fills in the result of a motion; returns whether the patches are one plane that has another motion too.
+/// Motions nearer than so many degrees are one.
+const APART: f64 = 3.0;
+
+/// Fills in the result of a motion.
 pub(crate) fn report_motion(
     out: &mut MotionEstimate,
     system: &System,
     motion: &Motion,
     covariance: Option<Matrix5>,
     surfaces: Option<&[Vector3<f64>]>,
-) -> bool {
+) {
     let tangent = tangents(&motion.u());
-    out.motion = *motion;
-    out.tangent = axes(&tangent);
-    if let Some(covariance) = covariance {
-        out.covariance = nested(&covariance);
-        out.direction_std = direction_deviation(&covariance);
-        out.rotation_std = std::array::from_fn(|i| covariance[(2 + i, 2 + i)].sqrt());
-    }
-    let here = system.equations(motion, &tangent, None);
-    if let Some(plugged) = plugged(&here.h, &here.p) {
-        out.bound = nested(&plugged.bound);
-    }
+    set_motion(out, motion, &tangent, covariance.as_ref(), &system.equations(motion, &tangent, None));
     let rates = Rates::new(&out.uncertain());
     out.surfaces = vec![[f64::NAN; 3]; out.inliers.len()];
     for (k, (patch, &source)) in system.patches.iter().zip(&system.source).enumerate() {
@@ -45,14 +44,6 @@ pub(crate) fn report_motion(
         let slopes = rates.slopes_of(surface[0], patch.depth_slopes(&tangent, motion, &seen));
         (out.time_to_contact[source], out.time_to_contact_std[source]) =
             rates.contact(surface[0], seen.covariance[(0, 0)], &slopes);
-    }
-    let distinct = (3.0 * out.direction_std).to_radians().max(1e-6);
-    match system.planar_twin(motion) {
-        Some(twin) if twin.angle_to(motion).min(twin.reversed().angle_to(motion)) > distinct => {
-            out.alternatives.push(Alternative { motion: twin, excess: 0.0 });
-            true
-        }
-        _ => false,
     }
 }
 
@@ -78,4 +69,86 @@ pub(crate) fn turning_report(
         out.inliers[source] = true;
     }
     out
+}
+
+/// Finds what else could be true: the status, and the other motions among the alternatives.
+///
+/// `minima`: all that were found, maximum likelihood's first; `places`: where patches lie; `low`: whether
+/// their surfaces are mostly noise.
+pub(crate) fn judge(
+    out: &mut MotionEstimate,
+    system: &System,
+    minima: &[Motion],
+    places: usize,
+    low: bool,
+    rng: CounterRng,
+) {
+    let own = out.direction_std;
+    let likelihood = direction_deviation(&Matrix5::from_fn(|i, j| out.likelihood.covariance[i][j]));
+    let distinct = (DISTINCT * own).to_radians().max(1e-6);
+    let twin = system.planar_twin(&out.motion);
+    let twin = twin.filter(|twin| twin.angle_to(&out.motion).min(twin.reversed().angle_to(&out.motion)) > distinct);
+    out.alternatives.extend(twin.map(|motion| Alternative { motion, excess: 0.0 }));
+    let found = others(system, &out.motion, minima, if own.is_finite() { own } else { 0.0 });
+    let doubtful = !found.is_empty();
+    for other in found {
+        if out.alternatives.iter().all(|known| known.motion.angle_to(&other.motion).to_degrees() > APART) {
+            out.alternatives.push(other);
+        }
+    }
+    // Not a number where it is not known.
+    let deviation = own.max(likelihood);
+    out.status = if places < FEW {
+        Status::FewPoints
+    } else if twin.is_some() {
+        Status::Ambiguous
+    } else if own.is_nan() || own > WIDE || far(system, &[out.motion, minima[0]], deviation, rng) {
+        Status::IllConditioned
+    } else if doubtful {
+        Status::Ambiguous
+    } else if low {
+        Status::LowSnr
+    } else {
+        Status::Ok
+    };
+}
+
+/// Other minima, and the opposites of all, that are about as likely with no patch behind the camera: each
+/// with the direction and the rotation that suit it best; the likeliest first.
+fn others(system: &System, motion: &Motion, minima: &[Motion], deviation: f64) -> Vec<Alternative> {
+    let least = system.refine_in_front(motion).equations.cost;
+    let distinct = (DISTINCT * deviation).max(APART).to_radians();
+    // Residuals of other minima are other components of the noise.
+    let limit = SURE + (3.0 * system.patches.len() as f64).sqrt();
+    let starts = minima.iter().flat_map(|minimum| [*minimum, minimum.reversed()]);
+    let mut found: Vec<Alternative> = Vec::new();
+    for other in starts.map(|start| system.refine_in_front(&start)) {
+        let other = Alternative { motion: other.motion, excess: other.equations.cost - least };
+        let same = |known: &Alternative| known.motion.angle_to(&other.motion).to_degrees() < APART;
+        if other.excess < limit && other.motion.angle_to(motion) > distinct && !found.iter().any(same) {
+            found.push(other);
+        }
+    }
+    found.sort_by(|a, b| a.excess.total_cmp(&b.excess));
+    found
+}
+
+/// Whether directions explain the patches as well as the estimate that are farther than the covariance has
+/// it.
+fn far(system: &System, motions: &[Motion], deviation: f64, rng: CounterRng) -> bool {
+    let n = system.patches.len();
+    let few = system.subset(&sample(n, SEARCHED, rng));
+    let fewer = (n as f64 / few.patches.len() as f64).sqrt();
+    let cost = |u: &Vector3<f64>, limit: f64| {
+        let (w, cost) = few.best_rotation(u).filter(|(_, cost)| *cost < limit)?;
+        let behind = |u: &Vector3<f64>| few.equations(&Motion::of(u, &w), &tangents(u), None).behind;
+        Some(cost + behind(u).min(behind(&-u)))
+    };
+    let Some(least) = motions.iter().filter_map(|m| cost(&m.u(), f64::INFINITY)).reduce(f64::min) else { return true };
+    let (limit, first) = (least + PLAUSIBLE, motions[0].u());
+    let angles = evaluate(|u| {
+        let plausible = cost(u, limit).is_some_and(|cost| cost < limit);
+        plausible.then(|| first.cross(u).norm().atan2(first.dot(u).abs()).to_degrees())
+    });
+    angles.into_iter().fold(0.0, f64::max) > FAR * deviation * fewer + SPACING
 }

@@ -1,20 +1,27 @@
-//! The estimating equation with surfaces drawn to their distribution over the patches.
+//! The estimating equation with surfaces drawn to their distribution over the patches, and whether its
+//! covariance holds.
+//!
+//! The theory is linear and takes the surfaces in the weights for known. With few patches neither is so, and
+//! errors have longer tails than a covariance from one linear step has: the scene that was found is measured
+//! again with new noise and solved again (B. Efron 1979: the bootstrap).
 
 use super::system::System;
+use crate::math::quantile;
+use crate::math::random::CounterRng;
+use crate::motion3d::diagnostics::confidence_region::PLAUSIBLE;
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::rows::tangents;
-use nalgebra::{Matrix3, Vector3};
+use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
+use crate::motion3d::solver::covariance::{inverse, plugged};
+use crate::motion3d::solver::efficient::{FARTHEST, ROUNDS};
+use nalgebra::{Matrix3, Vector3, Vector6};
+use rayon::prelude::*;
 
-/// Rounds of shrinking and solving; of expectation and maximisation; of the solution.
-const ROUNDS: usize = 3;
-const EXPECTATIONS: usize = 60;
+/// Most steps of expectation and maximisation, and of the solution.
 const STEPS: usize = 60;
 
-/// The length of a step that is the last, or its square in units of the motion's standard deviation; and the
-/// farthest that the direction may come, degrees.
-const STEP: f64 = 1e-9;
-const NEGLIGIBLE: f64 = 1e-8;
-const FARTHEST: f64 = 30.0;
+/// Patches from which on the linear theory does, and repetitions of fewer.
+const MANY: usize = 30;
+const REPETITIONS: u64 = 200;
 
 /// The solution with the surfaces in its weights.
 pub(crate) struct Shrunk {
@@ -36,7 +43,7 @@ fn posterior_means(surfaces: &[(Vector3<f64>, Matrix3<f64>)]) -> Option<Vec<Vect
     let mut mean = weights.try_inverse()? * mean;
     let mut spread = Matrix3::from_diagonal(&Vector3::repeat(mean.norm_squared().max(f64::MIN_POSITIVE)));
     let mut posterior: Vec<(Vector3<f64>, Matrix3<f64>)> = Vec::new();
-    for _ in 0..EXPECTATIONS {
+    for _ in 0..STEPS {
         posterior.clear();
         for (surface, covariance) in surfaces {
             let gain = spread * (spread + covariance).try_inverse()?;
@@ -52,24 +59,16 @@ fn posterior_means(surfaces: &[(Vector3<f64>, Matrix3<f64>)]) -> Option<Vec<Vect
 
 /// Solves `sum D(lambda~)^t e = 0` from `start`; `None` where that fails or leads far away.
 pub(crate) fn shrunk(system: &System, start: &Motion) -> Option<Shrunk> {
-    let mut motion = *start;
-    let mut surfaces = Vec::new();
+    let mut found = Shrunk { motion: *start, surfaces: Vec::new() };
     for _ in 0..ROUNDS {
-        let seen: Vec<_> = system
-            .patches
-            .iter()
-            .map(|patch| {
-                let seen = patch.seen(&motion);
-                (seen.surface, seen.covariance)
-            })
-            .collect();
-        surfaces = posterior_means(&seen)?;
-        motion = solve(system, &motion, &surfaces)?;
-        if motion.angle_to(start).to_degrees() > FARTHEST {
+        let seen = system.patches.iter().map(|patch| patch.seen(&found.motion));
+        found.surfaces = posterior_means(&seen.map(|seen| (seen.surface, seen.covariance)).collect::<Vec<_>>())?;
+        found.motion = solve(system, &found.motion, &found.surfaces)?;
+        if found.motion.angle_to(start).to_degrees() > FARTHEST {
             return None;
         }
     }
-    Some(Shrunk { motion, surfaces })
+    Some(found)
 }
 
 /// Scoring steps: the expected slope of the equation is that of its weights' own information.
@@ -82,6 +81,7 @@ fn solve(system: &System, start: &Motion, surfaces: &[Vector3<f64>]) -> Option<M
         let tangent = tangents(&motion.u());
         let here = system.equations(&motion, &tangent, Some(surfaces));
         let step = here.h.cholesky()?.solve(&here.gradient);
+        // Squared, in standard deviations of the motion.
         let length = here.gradient.dot(&step);
         if length > before {
             share *= 0.5;
@@ -91,9 +91,54 @@ fn solve(system: &System, start: &Motion, surfaces: &[Vector3<f64>]) -> Option<M
         if !step.iter().all(|value| value.is_finite()) {
             return None;
         }
-        if step.norm() < STEP || length < NEGLIGIBLE {
+        if length < 1e-8 {
             return Some(motion);
         }
     }
     None
+}
+
+/// What the covariance of a motion with these surfaces is to be multiplied with, at least 1, for its 95 %
+/// ellipsoid to hold; `weighted`: solved with drawn surfaces in the weights.
+pub(crate) fn covariance_factor(
+    system: &System,
+    motion: &Motion,
+    surfaces: &[Vector3<f64>],
+    weighted: bool,
+    rng: CounterRng,
+) -> f64 {
+    if system.patches.len() >= MANY {
+        return 1.0;
+    }
+    let repeated = |i: u64| distance(&again(system, motion, surfaces, rng.stream(i)), motion, weighted);
+    let mut distances: Vec<f64> = (0..REPETITIONS).into_par_iter().map(repeated).collect();
+    (quantile(&mut distances, 0.95).unwrap_or(0.0) / PLAUSIBLE).max(1.0)
+}
+
+/// The same patches with new noise.
+fn again(system: &System, motion: &Motion, surfaces: &[Vector3<f64>], rng: CounterRng) -> System {
+    let mut out = system.clone();
+    for (k, (patch, surface)) in out.patches.iter_mut().zip(surfaces).enumerate() {
+        let noise = Vector6::from_fn(|i, _| rng.normal((6 * k + i) as u64));
+        patch.f = patch.predicted(motion, surface) + noise;
+    }
+    out
+}
+
+/// The squared error of what is found, in units of its own covariance; infinite where nothing is.
+fn distance(system: &System, truth: &Motion, weighted: bool) -> f64 {
+    let likeliest = system.refine(truth);
+    let found = || -> Option<(Motion, Matrix5)> {
+        if !weighted {
+            let plugged = plugged(&likeliest.equations.h, &likeliest.equations.p)?;
+            return Some((likeliest.motion, plugged.likelihood));
+        }
+        let Shrunk { motion, surfaces } = shrunk(system, &likeliest.motion)?;
+        Some((motion, inverse(&system.equations(&motion, &tangents(&motion.u()), Some(&surfaces)).h)?))
+    };
+    let Some((found, covariance)) = found() else { return f64::INFINITY };
+    let along = tangents(&found.u()) * truth.u();
+    let turn = truth.w() - found.w();
+    let off = Vector5::new(along.x, along.y, turn.x, turn.y, turn.z);
+    covariance.cholesky().map_or(f64::INFINITY, |factor| off.dot(&factor.solve(&off)))
 }

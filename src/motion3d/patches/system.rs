@@ -1,21 +1,16 @@
-//! The equations of whitened patches.
+//! Whitened patches and the sums over them, as those of points.
 
 use crate::math::by_chance;
-use crate::motion3d::model::derotation::Derotation;
+use crate::motion3d::diagnostics::rotation_only::RotationOnly;
+use crate::motion3d::kernels::Equations;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::result::Moved;
-use crate::motion3d::model::rows::{AffineRows, Matrix5, Vector5, tangents};
+use crate::motion3d::model::rows::{AffineRows, Derotation, Matrix5, Vector5, tangents};
 use crate::motion3d::solver::covariance::inverse;
+use crate::motion3d::solver::refine::{Minimum, StoppingCriteria, descend};
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, Matrix6, RowVector2, SMatrix, Vector3, Vector6};
 
 type Matrix6x3 = SMatrix<f64, 6, 3>;
-
-/// Share of the trace that keeps `A^t A` invertible where the translation points at the patch.
-const RIDGE: f64 = 1e-12;
-
-/// Most steps to a minimum, and the length of one that is the last.
-const STEPS: usize = 60;
-const STEP: f64 = 1e-10;
 
 /// One patch: `f = A(u) lambda + R w + noise` with unit covariance, `A` linear in `u`.
 #[derive(Debug, Clone, Copy)]
@@ -48,16 +43,6 @@ pub(crate) struct SeenPatch {
 pub(crate) struct System {
     pub patches: Vec<Patch>,
     pub source: Vec<u32>,
-}
-
-/// The sums of one step, as those of points.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct PatchEquations {
-    pub h: Matrix5,
-    pub gradient: Vector5,
-    pub p: Matrix5,
-    pub cost: f64,
-    pub behind: f64,
 }
 
 impl Patch {
@@ -109,7 +94,8 @@ impl Patch {
 
     fn explained(&self, motion: &Motion, a: Matrix6x3) -> SeenPatch {
         let mut normal = a.transpose() * a;
-        normal += Matrix3::identity() * (RIDGE * normal.trace()).max(f64::MIN_POSITIVE);
+        // Invertible where the translation points at the patch, too.
+        normal += Matrix3::identity() * (1e-12 * normal.trace()).max(f64::MIN_POSITIVE);
         let covariance = normal.try_inverse().unwrap_or_else(Matrix3::zeros);
         let rest = self.f - self.r * motion.w();
         let surface = covariance * a.transpose() * rest;
@@ -162,12 +148,7 @@ impl System {
     }
 
     /// The sums at a motion, with the surfaces' own estimates or with `surfaces` in the weights.
-    pub fn equations(
-        &self,
-        motion: &Motion,
-        tangent: &Matrix2x3<f64>,
-        surfaces: Option<&[Vector3<f64>]>,
-    ) -> PatchEquations {
+    pub fn equations(&self, motion: &Motion, tangent: &Matrix2x3<f64>, surfaces: Option<&[Vector3<f64>]>) -> Equations {
         self.sums(motion, tangent, surfaces, Patch::seen)
     }
 
@@ -177,14 +158,8 @@ impl System {
         tangent: &Matrix2x3<f64>,
         surfaces: Option<&[Vector3<f64>]>,
         see: impl Fn(&Patch, &Motion) -> SeenPatch,
-    ) -> PatchEquations {
-        let mut sums = PatchEquations {
-            h: Matrix5::zeros(),
-            gradient: SMatrix::zeros(),
-            p: Matrix5::zeros(),
-            cost: 0.0,
-            behind: 0.0,
-        };
+    ) -> Equations {
+        let mut sums = Equations::default();
         for (k, patch) in self.patches.iter().enumerate() {
             let seen = see(patch, motion);
             let slopes = patch.slopes(tangent, &surfaces.map_or(seen.surface, |surfaces| surfaces[k]));
@@ -232,41 +207,32 @@ impl System {
         (w.iter().all(|value| value.is_finite()) && cost.is_finite()).then_some((w, cost))
     }
 
-    /// The minimum that is reached from `start`, by Levenberg-Marquardt.
-    pub fn refine(&self, start: &Motion) -> Motion {
-        self.descend(start, Patch::seen).0
+    /// The rotation that explains the flow best without a translation.
+    pub fn rotation_only(&self) -> Option<RotationOnly> {
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for patch in &self.patches {
+            normal += patch.r.tr_mul(&patch.r);
+            right += patch.r.tr_mul(&patch.f);
+        }
+        let factor = normal.cholesky()?;
+        let rotation = factor.solve(&right);
+        let chi2 = self.patches.iter().map(|patch| (patch.f - patch.r * rotation).norm_squared()).sum();
+        Some(RotationOnly { rotation, covariance: factor.inverse(), chi2 })
     }
 
-    /// The same with no patch behind the camera, and what it costs.
-    pub fn refine_in_front(&self, start: &Motion) -> (Motion, f64) {
+    /// The minimum that is reached from `start`.
+    pub fn refine(&self, start: &Motion) -> Minimum {
+        self.descend(start, Patch::seen)
+    }
+
+    /// The same with no patch behind the camera.
+    pub fn refine_in_front(&self, start: &Motion) -> Minimum {
         self.descend(start, Patch::seen_in_front)
     }
 
-    fn descend(&self, start: &Motion, see: fn(&Patch, &Motion) -> SeenPatch) -> (Motion, f64) {
-        let mut motion = *start;
-        let mut tangent = tangents(&motion.u());
-        let mut here = self.sums(&motion, &tangent, None, see);
-        let mut damping = 1e-4;
-        for _ in 0..STEPS {
-            let mut h = here.h;
-            for i in 0..5 {
-                h[(i, i)] *= 1.0 + damping;
-            }
-            let Some(step) = h.cholesky().map(|factor| factor.solve(&here.gradient)) else { break };
-            let next = motion.stepped(&tangent, &step);
-            let axes = tangents(&next.u());
-            let there = self.sums(&next, &axes, None, see);
-            if there.cost <= here.cost {
-                (motion, tangent, here) = (next, axes, there);
-                damping *= 0.1;
-            } else {
-                damping *= 10.0;
-            }
-            if step.norm() < STEP || damping > 1e12 {
-                break;
-            }
-        }
-        (motion, here.cost)
+    fn descend(&self, start: &Motion, see: fn(&Patch, &Motion) -> SeenPatch) -> Minimum {
+        let sums = |motion: &Motion, tangent: &Matrix2x3<f64>| self.sums(motion, tangent, None, see);
+        descend(*start, StoppingCriteria::FULL, self.patches.len(), sums)
     }
 
     /// `sum (Pi G_i E)^t B M^-1 B^t (Pi G_j E) C_ij`: the noise that is left with ideal weights (25).

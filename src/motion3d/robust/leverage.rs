@@ -7,7 +7,7 @@ use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::result::MotionEstimate;
-use crate::motion3d::model::rows::Matrix5;
+use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::solver::covariance::inverse;
 use nalgebra::{Matrix2x3, Vector3};
 
@@ -20,7 +20,6 @@ const SURE: f64 = 0.95;
 /// By how much the standard deviation may grow without the points that may be outliers.
 const MAX_GROWTH: f64 = 2.0;
 
-use crate::motion3d::model::rows::Vector5;
 /// Whether the direction's standard deviation would more than double without the inliers of the highest
 /// leverage, as many as outliers may fit by chance.
 ///

@@ -13,7 +13,7 @@ use super::{Consensus, INLIER, MIN_POINTS, inliers_of};
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{CHUNK, Observations};
-use crate::motion3d::model::rows::{Matrix5, tangents};
+use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
 use crate::motion3d::solver::covariance::{direction_spread, inverse};
 use nalgebra::{Matrix2, Matrix2x3, Vector2};
 use rayon::prelude::*;
@@ -33,7 +33,6 @@ const LONGEST: f64 = 0.2;
 const ROUNDS: usize = 6;
 const SETTLED: f64 = 1e-3;
 
-use crate::motion3d::model::rows::Vector5;
 /// A motion with its covariance in the axes `tangent`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct EstimatedMotion {

@@ -11,13 +11,13 @@ use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
 use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen, Vector2};
 
 /// Times that depths are smoothed and the equation is solved.
-const ROUNDS: usize = 3;
+pub(crate) const ROUNDS: usize = 3;
 
 /// A change of the direction, degrees, that is not worth another round.
 const SETTLED: f64 = 0.001;
 
 /// The farthest that the direction may come from where it began, degrees.
-const FARTHEST: f64 = 30.0;
+pub(crate) const FARTHEST: f64 = 30.0;
 
 /// Most Newton steps, and the length of one that is the last.
 const STEPS: usize = 30;

@@ -2,7 +2,7 @@
 //!
 //! Half way between both ends a displacement is the instantaneous flow to second order. The rest, of third
 //! order in rotation and translation, is in no covariance; rows that have the motion's own rotation taken out
-//! of them ([`derotation`](crate::motion3d::model::derotation)) have none. Where the rest would move an
+//! of them ([`derotation`](crate::motion3d::model::rows)) have none. Where the rest would move an
 //! estimate by a small share of its standard deviation, nothing is turned.
 
 use super::likelihood::different;
@@ -11,10 +11,9 @@ use super::starts::at_most;
 use crate::math::quantile;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{depths, slopes};
-use crate::motion3d::model::derotation::Derotation;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
+use crate::motion3d::model::rows::{Derotation, Matrix5, Vector5, tangents};
 use crate::motion3d::model::whitening::Whitening;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -32,7 +31,7 @@ const NEGLIGIBLE: f64 = 0.01;
 const SETTLED: f64 = 1e-14;
 const ROUGHLY: f64 = 1e-3;
 const MANY: usize = 10_000;
-const ROUNDING: f64 = 1e-13;
+pub(crate) const ROUNDING: f64 = 1e-13;
 
 /// What a rest may add to squared residuals, in standard deviations of their sum by chance, before anything
 /// is known of the motion.
@@ -42,7 +41,7 @@ const HIDDEN: f64 = 0.1;
 const MAX_REST: f64 = 0.1;
 
 /// Most times that rows are turned about what they gave.
-const ROUNDS: usize = 6;
+pub(crate) const ROUNDS: usize = 6;
 
 /// Pairs of points that a first rotation is tried from, the share of the points that decide between them, and
 /// rounds of weights.

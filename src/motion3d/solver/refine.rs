@@ -45,15 +45,15 @@ pub(crate) struct Minimum {
 }
 
 impl Minimum {
-    fn at(observations: &Observations, motion: Motion, cut: Option<f64>) -> Self {
+    fn at(motion: Motion, sums: impl Fn(&Motion, &Matrix2x3<f64>) -> Equations) -> Self {
         let tangent = tangents(&motion.u());
-        Self { motion, tangent, equations: equations(observations, &motion, &tangent, cut) }
+        Self { motion, tangent, equations: sums(&motion, &tangent) }
     }
 
     /// The same with all depths of the other sign: `e` and `J` stay, `D` at the depths changes its sign with
     /// the axes.
     pub fn reversed(&self, observations: &Observations) -> Self {
-        Self::at(observations, self.motion.reversed(), None)
+        Self::at(self.motion.reversed(), |motion, tangent| equations(observations, motion, tangent, None))
     }
 }
 
@@ -80,7 +80,17 @@ pub(crate) fn refine(
     cut: Option<f64>,
     effort: StoppingCriteria,
 ) -> Minimum {
-    let mut here = Minimum::at(observations, start, cut);
+    descend(start, effort, observations.n, |motion, tangent| equations(observations, motion, tangent, cut))
+}
+
+/// The minimum of a cost that is reached from `start`; `sums`: those of `n` measurements at a motion.
+pub(crate) fn descend(
+    start: Motion,
+    effort: StoppingCriteria,
+    n: usize,
+    sums: impl Fn(&Motion, &Matrix2x3<f64>) -> Equations,
+) -> Minimum {
+    let mut here = Minimum::at(start, &sums);
     let mut damping = 1e-4;
     for _ in 0..effort.steps {
         let Some(change) = step(&here.equations, damping) else {
@@ -90,8 +100,8 @@ pub(crate) fn refine(
             }
             continue;
         };
-        let there = Minimum::at(observations, here.motion.stepped(&here.tangent, &change), cut);
-        let deviations = squared_deviations(&here.equations, &change, observations.n).sqrt();
+        let there = Minimum::at(here.motion.stepped(&here.tangent, &change), &sums);
+        let deviations = squared_deviations(&here.equations, &change, n).sqrt();
         let settled = change.norm() < effort.tolerance || deviations < effort.deviations;
         if there.equations.cost <= here.equations.cost {
             here = there;
@@ -118,13 +128,14 @@ mod tests {
         let observations = scene.observations();
         for cut in [None, Some(2.0)] {
             let at = Motion::new([0.5, 0.3, 0.8], [0.03, -0.02, 0.0]);
-            let here = Minimum::at(&observations, at, cut);
+            let minimum = |motion: Motion| refine(&observations, motion, cut, StoppingCriteria::NONE);
+            let here = minimum(at);
             for axis in 0..5 {
                 let h = 1e-6;
                 let cost = |by: f64| {
                     let mut step = Vector5::zeros();
                     step[axis] = by;
-                    Minimum::at(&observations, at.stepped(&here.tangent, &step), cut).equations.cost
+                    minimum(at.stepped(&here.tangent, &step)).equations.cost
                 };
                 let slope = (cost(h) - cost(-h)) / (2.0 * h);
                 let want = -2.0 * here.equations.gradient[axis];

@@ -18,8 +18,8 @@ const DIRECTIONS: usize = 300;
 pub(crate) const SEARCHED: usize = 1000;
 
 /// Starts that are refined, and the least angle between them, degrees.
-const STARTS: usize = 5;
-const APART: f64 = 12.0;
+pub(crate) const STARTS: usize = 5;
+pub(crate) const APART: f64 = 12.0;
 
 /// Directions along each side of a picture that is narrower than this (half of it, rad): there the minimum is
 /// as narrow as the picture, if the epipole lies within. The share of the picture by which these reach beyond
