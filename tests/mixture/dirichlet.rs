@@ -1,42 +1,11 @@
 //! Exact cases, invariances and extremes.
 
+use crate::cases::{assert_near, case_d1, clusters, options};
 use jacoflow::math::random::CounterRng;
 use jacoflow::mixture::{
     CovariancePrior, DirichletMixture, DirichletOptions, Inference, Points, fit_dirichlet, fit_dirichlet_from,
 };
 use jacoflow::parallel::Threads;
-
-/// Case D1 of twenty points in the plane, without random numbers: points, weights, responsibilities (20, 3).
-fn case_d1() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let (mut x, mut w, mut r) = (vec![], vec![], vec![]);
-    for n in 0..20 {
-        let (at, odd) = (f64::from(n), f64::from(n % 2));
-        x.extend([6.0 * odd - 3.0 + 0.5 * (3.0 * at).sin(), odd + 0.7 * (2.0 * at).cos()]);
-        w.push(f64::from(1 + 7 * n % 5));
-        let row = [0, 1, 2].map(|k| f64::from(1 + (n + 2 * k) % 3) + if k == 1 { odd } else { 0.0 });
-        r.extend(row.map(|value| value / row.iter().sum::<f64>()));
-    }
-    (x, w, r)
-}
-
-/// Options of case D1: `S0 = I`, no merging, exactly `rounds` rounds.
-fn options(rounds: usize) -> DirichletOptions {
-    DirichletOptions {
-        n_components: 3,
-        covariance_prior: CovariancePrior::Isotropic(1.0),
-        merge: false,
-        max_iter: rounds,
-        tol: None,
-        ..DirichletOptions::default()
-    }
-}
-
-fn assert_near(got: &[f64], want: &[f64], tolerance: f64) {
-    assert_eq!(got.len(), want.len());
-    for (got, want) in got.iter().zip(want) {
-        assert!((got - want).abs() <= tolerance, "{got} is not {want}");
-    }
-}
 
 /// Case D1 with other options.
 fn d1(options: &DirichletOptions) -> DirichletMixture {
@@ -65,6 +34,8 @@ fn case_d1_has_its_published_figures() {
     assert_near(&fifty.counts, &[30.0, 16.057_621_094_8, 13.942_378_905_2], 1e-9);
     assert_near(&fifty.means[..2], &[3.345_230_331_5, 1.027_437_120_3], 1e-9);
     assert_near(&[fifty.lower_bound], &[-110.868_222_661_9], 1e-9);
+    let half = d1(&DirichletOptions { weight_concentration: 0.5, ..options(50) });
+    assert_near(&half.weights, &[0.504_201_680_7, 0.272_430_545_0, 0.223_367_774_3], 1e-9);
 }
 
 #[test]
@@ -85,15 +56,6 @@ fn three_points_have_their_exact_evidence() {
     let psi: Vec<f64> = mixture.covariances.iter().map(|value| (4.0 + 3.5 + 4.0) * value).collect();
     assert_near(&psi, &[1.857_142_857_1, -0.571_428_571_4, -0.571_428_571_4, 2.714_285_714_3], 1e-9);
     assert_near(&[mixture.lower_bound], &[-13.138_681_373_1], 1e-9);
-}
-
-/// Points about `centres` places, whole weights.
-fn clusters(count: usize, dimensions: usize, centres: u64, seed: u64) -> (Vec<f64>, Vec<f64>) {
-    let rng = CounterRng::new(seed);
-    let centre = |n: usize, d: usize| 8.0 * rng.stream(n as u64 % centres).normal(d as u64);
-    let x = (0..count * dimensions).map(|i| centre(i / dimensions, i % dimensions) + rng.normal(i as u64)).collect();
-    let w = (0..count).map(|n| (rng.bits(n as u64) % 4) as f64).collect();
-    (x, w)
 }
 
 #[test]

@@ -1,55 +1,18 @@
 //! Exact cases, invariances and extremes.
 
 use super::*;
-use crate::math::random::CounterRng;
-use crate::mixture::options::CovariancePrior;
 use crate::mixture::points::Points;
+use cases::{assert_near, case_d1, clusters, options};
 
-/// Case D1 of twenty points in the plane, without random numbers: points, weights, responsibilities (20, 3).
-fn case_d1() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let (mut x, mut w, mut r) = (vec![], vec![], vec![]);
-    for n in 0..20 {
-        let (at, odd) = (f64::from(n), f64::from(n % 2));
-        x.extend([6.0 * odd - 3.0 + 0.5 * (3.0 * at).sin(), odd + 0.7 * (2.0 * at).cos()]);
-        w.push(f64::from(1 + 7 * n % 5));
-        let row = [0, 1, 2].map(|k| f64::from(1 + (n + 2 * k) % 3) + if k == 1 { odd } else { 0.0 });
-        r.extend(row.map(|value| value / row.iter().sum::<f64>()));
-    }
-    (x, w, r)
-}
+#[path = "../../../tests/mixture/cases.rs"]
+mod cases;
 
-/// Options of case D1: `S0 = I`, no merging, exactly `rounds` rounds.
-fn options(rounds: usize) -> DirichletOptions {
-    DirichletOptions {
-        n_components: 3,
-        covariance_prior: CovariancePrior::Isotropic(1.0),
-        merge: false,
-        max_iter: rounds,
-        tol: None,
-        ..DirichletOptions::default()
-    }
-}
-
-fn assert_near(got: &[f64], want: &[f64], tolerance: f64) {
-    assert_eq!(got.len(), want.len());
-    for (got, want) in got.iter().zip(want) {
-        assert!((got - want).abs() <= tolerance, "{got} is not {want}");
-    }
-}
-
-/// Case D1 with other options.
-fn d1(options: &DirichletOptions) -> DirichletMixture {
-    let (x, w, r) = case_d1();
-    fit_dirichlet_from(&Points { dimensions: 2, values: &x, weights: Some(&w) }, options, &r).unwrap()
-}
-
+/// Of variational Bayes the expectations of the logarithms are published: they are those of the counts.
 #[test]
-fn concentration_and_inference_of_case_d1() {
-    let half = d1(&DirichletOptions { weight_concentration: 0.5, ..options(50) });
-    assert_near(&half.weights, &[0.504_201_680_7, 0.272_430_545_0, 0.223_367_774_3], 1e-9);
-
-    // Of variational Bayes the expectations of the logarithms are published: they are those of the counts.
-    let five = d1(&DirichletOptions { inference: Inference::Vb, ..options(5) });
+fn variational_proportions_of_case_d1() {
+    let (x, w, r) = case_d1();
+    let points = Points { dimensions: 2, values: &x, weights: Some(&w) };
+    let five = fit_dirichlet_from(&points, &DirichletOptions { inference: Inference::Vb, ..options(5) }, &r).unwrap();
     let logs = sticks::log_proportions(&five.counts, 1.0, Inference::Vb);
     let proportions: Vec<f64> = logs.iter().map(|log| log.exp()).collect();
     assert_near(&proportions, &[0.444_085_478_3, 0.302_767_529_2, 0.222_411_085_4], 1e-9);
@@ -67,15 +30,6 @@ fn hard_divisions_have_their_exact_score() {
         problem.scorer.score(&start.moments, start.negentropy).unwrap()
     };
     assert_near(&[score(1, |_| 0), score(2, |n| n % 2)], &[-219.655_393_200_6, -97.525_072_635_4], 1e-9);
-}
-
-/// Points about `centres` places, whole weights.
-fn clusters(count: usize, dimensions: usize, centres: u64, seed: u64) -> (Vec<f64>, Vec<f64>) {
-    let rng = CounterRng::new(seed);
-    let centre = |n: usize, d: usize| 8.0 * rng.stream(n as u64 % centres).normal(d as u64);
-    let x = (0..count * dimensions).map(|i| centre(i / dimensions, i % dimensions) + rng.normal(i as u64)).collect();
-    let w = (0..count).map(|n| (rng.bits(n as u64) % 4) as f64).collect();
-    (x, w)
 }
 
 /// What pooling does to F when the responsibilities are held, from the definition: the oracle of the sums
