@@ -20,7 +20,6 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("motion3d.leverage", "few points that decide alone are reported as few_points"),
     ("motion3d.region_by_chance", "directions that residuals alone exclude are compared by depths and scores"),
     ("motion3d.basins", "starts from a few steps on a few points"),
-    ("motion3d.narrow_field_starts", "closer starts within a narrow picture"),
     ("edges.contrast", "gain between the cameras is estimated and taken out"),
     ("edges.refused_cost", "matches of a high cost are refused"),
     ("edges.watched_rows", "a known row offset is estimated again where a pair contradicts it"),

@@ -1,7 +1,9 @@
 //! Entry point: estimates rigid motion from optical flow.
 
 use super::diagnostics::report::{doubted, rotation_report, with_all_inliers};
-use super::diagnostics::rotation_only::{explained_by_rotation, explained_by_rotation_in_unknown_noise};
+use super::diagnostics::rotation_only::{
+    explained_by_rotation, explained_by_rotation_in_unknown_noise, without_likeliest_rotation,
+};
 use super::fit::Task;
 use super::model::input::{Flow, Noise};
 use super::model::observations::Scaled;
@@ -10,7 +12,6 @@ use super::model::result::{MotionEstimate, Status};
 use super::model::whitening::Whitening;
 use super::robust;
 use super::robust::Consensus;
-use super::solver::finite_rotation::beforehand;
 use crate::error::Result;
 use crate::math::random::CounterRng;
 
@@ -63,7 +64,10 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     }
     scaled.observations.prior = options.rotation_prior.as_ref().and_then(RotationPrior::information);
     let rng = CounterRng::new(options.random_state);
-    if let Some(turned) = beforehand(&whitening, &scaled.observations, (options.robust, scaled.unknown), rng.stream(5))
+    // What is left of the flow without the rotation that explains most of it is short: a search that knows
+    // nothing of the motion then sees nearly exact flow.
+    if !options.robust
+        && let Some(turned) = without_likeliest_rotation(&whitening, &scaled.observations)
     {
         scaled.observations = turned;
     }

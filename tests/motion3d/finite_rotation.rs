@@ -105,10 +105,9 @@ fn two_exact_views_give_the_exact_motion_and_depths() {
     }
 }
 
-/// Where the third order does not matter, nothing is turned: the result is that of instantaneous flow half
-/// way, but for which points are neighbours.
+/// Where the third order does not matter, the result is that of instantaneous flow half way.
 #[test]
-fn slow_displacements_are_placed_half_way_and_left_alone() {
+fn slow_displacements_are_instantaneous_flow_half_way() {
     let truth = rotating(0, 0.02);
     let seen = views(&truth, 300, 3, |_, r| 0.02 * (0.5 + r)).noisy(6e-4, 5);
     let options = MotionOptions { method: Method::MaximumLikelihood, ..MotionOptions::default() };
@@ -119,7 +118,8 @@ fn slow_displacements_are_placed_half_way_and_left_alone() {
         half_way: Vec::new(),
     };
     let options = MotionOptions { placement: Placement::Start, ..options };
-    assert_eq!(found.motion, half_way.run(&Noise::StandardDeviation(6e-4), &options).motion);
+    let instantaneous = half_way.run(&Noise::StandardDeviation(6e-4), &options).motion;
+    assert!(found.motion.angle_to(&instantaneous).to_degrees() < 0.01 * found.direction_std);
 }
 
 #[test]

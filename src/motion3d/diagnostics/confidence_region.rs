@@ -13,16 +13,9 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::Smoother;
 use crate::motion3d::model::rows::tangents;
-use crate::motion3d::model::whitening::Whitening;
-use crate::motion3d::solver::finite_rotation::afresh;
-use crate::motion3d::solver::likelihood::minima;
 use crate::motion3d::solver::smoothing::DepthSmoother;
 use crate::motion3d::solver::starts::{at_most, evaluate};
 use nalgebra::Vector3;
-use rayon::prelude::*;
-
-/// How much, rad, a rotation may differ from the one that was taken out before others are examined.
-const MAX_ROTATION_CHANGE: f64 = 0.1;
 
 /// The 0.95 quantile of chi-squared with five degrees of freedom.
 pub(crate) const PLAUSIBLE: f64 = 11.07;
@@ -31,13 +24,13 @@ pub(crate) const PLAUSIBLE: f64 = 11.07;
 const CONSISTENT: f64 = 5.99;
 
 /// Standard deviations that chance may add to a difference of `J`.
-pub(crate) const CHANCE: f64 = 2.0;
+const CHANCE: f64 = 2.0;
 
 /// Depth maps whose costs differ by less than this times `sqrt(n)` are as smooth.
 const AS_SMOOTH: f64 = 1.0;
 
 /// Most doubtful directions whose depth maps are compared, the likeliest by what else is known of them.
-pub(crate) const COMPARED: usize = 12;
+const COMPARED: usize = 12;
 
 /// Angles to the estimate, degrees, beyond which a direction is tested.
 #[derive(Debug, Clone, Copy)]
@@ -50,7 +43,7 @@ pub(crate) struct Farther {
 
 /// A direction with the rotation and the sign that suit it best.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct TestedDirection {
+struct TestedDirection {
     pub motion: Motion,
     /// `J` and the depths behind the camera.
     pub cost: f64,
@@ -92,15 +85,10 @@ pub(crate) fn plausible_beyond(
     }
     doubts.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     doubts.truncate(COMPARED);
-    let among = |tested: &[TestedDirection]| tested.iter().map(|tested| (searched, *tested)).collect::<Vec<_>>();
-    as_likely(&among(&known), &among(&doubts), rng.stream(1))
+    as_likely(searched, &known, &doubts, rng.stream(1))
 }
 
-pub(crate) fn test_direction(
-    observations: &Observations,
-    u: &Vector3<f64>,
-    first: &Vector3<f64>,
-) -> Option<TestedDirection> {
+fn test_direction(observations: &Observations, u: &Vector3<f64>, first: &Vector3<f64>) -> Option<TestedDirection> {
     let (w, cost) = best_rotation(observations, u)?;
     let signs = [Motion::of(u, &w), Motion::of(&-u, &w)];
     let behind = signs.map(|motion| equations(observations, &motion, &tangents(&motion.u()), None).behind);
@@ -110,7 +98,7 @@ pub(crate) fn test_direction(
 }
 
 /// Standard deviation of the difference of two directions' `J` by chance, `2 sqrt(sum sin^2 phi)`.
-pub(crate) fn fluctuation(observations: &Observations, one: &Motion, other: &Motion) -> f64 {
+fn fluctuation(observations: &Observations, one: &Motion, other: &Motion) -> f64 {
     let turned = |k: usize| {
         let g = observations.row(k).g;
         let (a, b) = (g * one.u(), g * other.u());
@@ -122,20 +110,16 @@ pub(crate) fn fluctuation(observations: &Observations, one: &Motion, other: &Mot
 }
 
 /// Whether one of the doubtful directions has depths as smooth as those of the known motions, and is
-/// consistent with the estimating equation; each with the points as it sees them.
-pub(crate) fn as_likely(
-    known: &[(&Observations, TestedDirection)],
-    doubts: &[(&Observations, TestedDirection)],
-    rng: CounterRng,
-) -> bool {
-    let Some((points, _)) = known.first().filter(|_| !doubts.is_empty()) else { return false };
+/// consistent with the estimating equation.
+fn as_likely(points: &Observations, known: &[TestedDirection], doubts: &[TestedDirection], rng: CounterRng) -> bool {
+    if doubts.is_empty() {
+        return false;
+    }
     let mut smoother = DepthSmoother::new(points, Smoother::Auto, rng);
-    let cost = |(points, tested): &(&Observations, TestedDirection)| {
-        tested.cost + smoother.cost(&depths(points, &tested.motion))
-    };
+    let cost = |tested: &TestedDirection| tested.cost + smoother.cost(&depths(points, &tested.motion));
     let limit = known.iter().map(cost).fold(f64::INFINITY, f64::min) + AS_SMOOTH * (points.n as f64).sqrt();
     let smooth: Vec<_> = doubts.iter().filter(|doubt| cost(doubt) < limit).collect();
-    smooth.into_iter().any(|(points, tested)| consistent(points, &tested.motion, &mut smoother))
+    smooth.into_iter().any(|tested| consistent(points, &tested.motion, &mut smoother))
 }
 
 /// Whether the estimating equation holds at a motion but for chance: of `g = sum W^t e` with weights from
@@ -147,60 +131,4 @@ fn consistent(observations: &Observations, motion: &Motion, smoother: &mut Depth
     let (value, _) = Bilinear::new(observations, motion, &tangent, &nu, 0.0).at(motion, &tangent);
     let Some(factor) = information(observations, motion, &tangent, &nu, 0.0).cholesky() else { return false };
     value.dot(&factor.solve(&value)) < CONSISTENT
-}
-
-/// Times that a direction's own rotation is taken out.
-pub(crate) const ROUNDS: usize = 4;
-
-/// Whether, for `most` of the points, a direction that is `farther` from the estimate's is as plausible, each
-/// with its own rotation taken out.
-pub(crate) fn plausible_less_turned(
-    whitening: &Whitening<'_>,
-    inliers: &Observations,
-    motion: &Motion,
-    farther: Farther,
-    most: usize,
-    rng: CounterRng,
-) -> bool {
-    let own = &*at_most(inliers, most, rng.stream(0));
-    if !own.displaced || own.turn.is_none() {
-        return false;
-    }
-    let Some(fresh) = afresh(whitening, own) else { return false };
-    let wandered = fresh.turn.is_some_and(|turn| (turn.rotation - motion.w()).norm() > MAX_ROTATION_CHANGE);
-    if !wandered {
-        return false;
-    }
-    let u = motion.u();
-    let Some(best) = test_direction(own, &u, &u) else { return false };
-    let limit = |tested: &TestedDirection| best.cost + PLAUSIBLE + CHANCE * fluctuation(own, motion, &tested.motion);
-    let apart = |tested: &TestedDirection| tested.motion.angle_to(motion).to_degrees() > farther.chance;
-    let mut tested = evaluate(|u| test_direction(&fresh, u, u));
-    tested.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    tested.retain(|tested| apart(tested) && tested.cost < limit(tested));
-    tested.truncate(COMPARED);
-    let found = minima(&fresh, rng.stream(1));
-    tested.extend(found.iter().filter_map(|minimum| test_direction(&fresh, &minimum.motion.u(), &u)));
-    let exact = tested.into_par_iter().filter_map(|tested| exactly(whitening, &fresh, tested));
-    let exact: Vec<(Observations, TestedDirection)> =
-        exact.filter(|(_, tested)| apart(tested) && tested.cost < limit(tested)).collect();
-    let doubts: Vec<(&Observations, TestedDirection)> =
-        exact.iter().map(|(points, tested)| (points, *tested)).collect();
-    as_likely(&[(own, best)], &doubts, rng.stream(2))
-}
-
-/// A direction with the rotation that suits it best, which is taken out of the points.
-pub(crate) fn exactly(
-    whitening: &Whitening<'_>,
-    fresh: &Observations,
-    mut tested: TestedDirection,
-) -> Option<(Observations, TestedDirection)> {
-    let u = tested.motion.u();
-    let mut turned = None;
-    for _ in 0..ROUNDS {
-        let next = whitening.derotated(fresh, tested.motion.derotation());
-        tested = test_direction(&next, &u, &u)?;
-        turned = Some(next);
-    }
-    turned.filter(|turned| turned.unseen() <= fresh.unseen()).map(|turned| (turned, tested))
 }

@@ -220,7 +220,7 @@ pub(crate) fn other_motion<'a>(
     let Some(turn) = observations.turn else {
         let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&motion.u())));
         // What the estimate is off by is in the plane, too.
-        let other = refine(observations, other, None, StoppingCriteria::FULL).motion;
+        let other = refine(observations, other, StoppingCriteria::FULL).motion;
         return Some((other, Cow::Borrowed(observations)));
     };
     // In the axes half way the translation is V' u and rotations are V' w.
@@ -230,7 +230,7 @@ pub(crate) fn other_motion<'a>(
     let mut seen = observations.clone();
     for _ in 0..TURNS {
         seen = whitening.derotated(&seen, other.derotation());
-        other = refine(&seen, other, None, StoppingCriteria::FULL).motion;
+        other = refine(&seen, other, StoppingCriteria::FULL).motion;
     }
     Some((other, Cow::Owned(seen)))
 }

@@ -2,6 +2,8 @@
 
 use crate::math::by_chance;
 use crate::motion3d::model::observations::{Observations, ROUNDING};
+use crate::motion3d::model::rows::Derotation;
+use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::covariance::DETERMINED;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
@@ -70,6 +72,26 @@ pub(crate) fn rotation_only(observations: &Observations) -> Option<RotationOnly>
         covariance,
         chi2,
     })
+}
+
+/// Times that the likeliest rotation is taken out and found again.
+const TURNS: usize = 4;
+
+/// Displacements without the rotation that explains most of them by itself; `None` of other flow, or where
+/// the points do not determine it.
+pub(crate) fn without_likeliest_rotation(
+    whitening: &Whitening<'_>,
+    observations: &Observations,
+) -> Option<Observations> {
+    if !observations.displaced {
+        return None;
+    }
+    let mut turned = observations.clone();
+    for _ in 0..TURNS {
+        let found = rotation_only(&turned)?;
+        turned = whitening.derotated(&turned, Derotation::new(&found.rotation));
+    }
+    Some(turned)
 }
 
 /// The rotation alone, where chance explains what it leaves: of errors that points share there are fewer.

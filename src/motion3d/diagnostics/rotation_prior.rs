@@ -63,7 +63,7 @@ pub(crate) fn contradiction(
 pub(crate) fn of_flow_alone(inliers: &Observations, motion: &Motion) -> Alternative {
     let mut alone = inliers.clone();
     alone.prior = None;
-    let found = refine(&alone, *motion, None, StoppingCriteria::of(inliers.n)).motion;
+    let found = refine(&alone, *motion, StoppingCriteria::of(inliers.n)).motion;
     let cost = |motion: &Motion| equations(inliers, motion, &tangents(&motion.u()), None).cost;
     Alternative { motion: found, excess: cost(&found) - cost(motion) }
 }

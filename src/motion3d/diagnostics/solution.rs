@@ -11,7 +11,7 @@ use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::model::result::{Alternative, CommonEffect, Likelihood, Moved, Status, UNKNOWN, axes, nested};
 use crate::motion3d::model::rows::Matrix5;
 use crate::motion3d::robust::{Consensus, EstimatedMotion, weighted_by_posterior};
-use crate::motion3d::solver::covariance::{PluginCovariances, inverse};
+use crate::motion3d::solver::covariance::{PluginCovariances, direction_deviation, inverse};
 use crate::motion3d::solver::efficient::{Efficient, nonlinearity_covariance};
 use crate::motion3d::solver::likelihood::Candidate;
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, RowVector2};
@@ -27,6 +27,16 @@ pub(crate) struct Solution {
     pub common: CommonEffect,
     /// What it was made of.
     grown: Option<CovarianceParts>,
+    /// Whether the depths are mostly noise, so that nothing is known of maximum likelihood's covariance.
+    pub low: bool,
+    /// Standard deviation of maximum likelihood's direction, degrees; 0 where it is not known.
+    pub likelihood_std: f64,
+    /// Squared depths behind the camera at maximum likelihood's motion, in units of their standard deviation.
+    pub behind: f64,
+    /// Whether the covariance describes the shape of the confidence region.
+    pub described: bool,
+    /// The motion of the flow alone, where that contradicts what is known of the rotation.
+    pub without_prior: Option<Alternative>,
     pub status: Status,
     pub alternatives: Vec<Alternative>,
     pub likelihood: Likelihood,
@@ -58,6 +68,11 @@ impl Solution {
             covariance: plugged.map(|plugged| plugged.likelihood),
             common: CommonEffect::default(),
             grown: None,
+            low: plugged.is_none(),
+            likelihood_std: plugged.map_or(0.0, |plugged| direction_deviation(&plugged.likelihood)),
+            behind: minimum.equations.behind,
+            described: true,
+            without_prior: None,
             status: Status::Ok,
             alternatives: Vec::new(),
             likelihood,

@@ -1,6 +1,6 @@
 //! How far a motion can be trusted.
 
-use super::confidence_region::{Farther, plausible_beyond, plausible_less_turned};
+use super::confidence_region::{Farther, plausible_beyond};
 use super::planar_twin::planar_twin;
 use super::solution::Solution;
 use crate::math::random::CounterRng;
@@ -14,9 +14,8 @@ use crate::motion3d::robust::CompetingMotion;
 use crate::motion3d::solver::covariance::{DETERMINED, direction_deviation};
 use crate::motion3d::solver::likelihood::SAME;
 use crate::motion3d::solver::refine::{StoppingCriteria, descend};
-use crate::motion3d::solver::starts::{SEARCHED, sample};
+use crate::motion3d::solver::starts::{SEARCHED, at_most};
 use nalgebra::{Matrix2x3, SymmetricEigen};
-use std::borrow::Cow;
 
 /// Below so many points several motions may explain them exactly.
 const FEW: usize = 12;
@@ -47,45 +46,30 @@ const BLIND: f64 = 20.0;
 /// plane.
 const EXCLUDED: f64 = 25.0;
 
-/// What else speaks for or against a motion.
-pub(crate) struct Evidence<'a> {
-    /// Maximum likelihood's motion, and its depths behind the camera in squared standard deviations.
-    pub likelihood: (Motion, f64),
-    /// Standard deviation of maximum likelihood's direction, degrees; 0 where it is not known.
-    pub deviation: f64,
-    /// Whether the depths are mostly noise.
-    pub low: bool,
-    /// Whether the covariance describes the shape of the confidence region.
-    pub described: bool,
-    /// Whether the noise is what the motion leaves.
-    pub unknown: bool,
-    /// Motions of other points.
-    pub competing: &'a [CompetingMotion],
-    /// Another solution that is about as likely.
-    pub undecided: Option<Alternative>,
-}
-
 /// Finds what else could be true: the status, and the other motions among the alternatives.
+///
+/// `unknown`: the noise is what the motion leaves; `competing`: motions of other points.
 pub(crate) fn judge(
     whitening: &Whitening<'_>,
     inliers: &Observations,
     solution: &mut Solution,
-    evidence: &Evidence<'_>,
+    unknown: bool,
+    competing: &[CompetingMotion],
     rng: CounterRng,
 ) {
     let deviation = solution.covariance.map_or(f64::INFINITY, |c| direction_deviation(&c));
     // Where even that is not finite, no other motion is distinct.
     let distinct = (3.0 * if deviation.is_finite() { deviation } else { 0.0 }).to_radians().max(1e-6);
-    let planar = planar(whitening, inliers, solution, evidence, distinct);
+    let planar = planar(whitening, inliers, solution, unknown, distinct);
     let turned = opposite(inliers, &solution.motion, rng.stream(0));
     if let Some((motion, excess)) = turned {
         solution.alternatives.insert(0, Alternative { motion, excess });
     }
-    if let Some(other) = evidence.undecided {
+    if let Some(other) = solution.without_prior {
         solution.alternatives.retain(|known| known.motion.angle_to(&other.motion) > distinct);
         solution.alternatives.insert(0, other);
     }
-    let others = evidence.competing.iter().filter(|competitor| competitor.others);
+    let others = competing.iter().filter(|competitor| competitor.others);
     let same = if deviation.is_finite() { deviation.max(SAME) } else { SAME };
     for (place, competitor) in others.clone().enumerate() {
         solution.alternatives.retain(|known| known.motion.angle_to(&competitor.motion).to_degrees() > same);
@@ -93,7 +77,7 @@ pub(crate) fn judge(
         solution.alternatives.insert(place, Alternative { motion: competitor.motion, excess: competitor.excess });
     }
     once(&mut solution.alternatives);
-    let motions = [solution.motion, evidence.likelihood.0];
+    let motions = [solution.motion, solution.likelihood.motion];
     solution.status = if inliers.n < FEW {
         Status::FewPoints
     } else if inliers.unseen() > 0 {
@@ -105,16 +89,15 @@ pub(crate) fn judge(
         Status::IllConditioned
     } else if planar || others.count() > 0 {
         Status::Ambiguous
-    } else if !evidence.described
+    } else if !solution.described
         || deviation.is_nan()
         || deviation > WIDE
-        || far(inliers, &motions, deviation, evidence.deviation, rng.stream(1))
-        || has_other_rotation(whitening, inliers, solution, (deviation, evidence.deviation), rng.stream(2))
+        || far(inliers, &motions, deviation, solution.likelihood_std, rng.stream(1))
     {
         Status::IllConditioned
-    } else if turned.is_some() || evidence.undecided.is_some() {
+    } else if turned.is_some() || solution.without_prior.is_some() {
         Status::Ambiguous
-    } else if evidence.low {
+    } else if solution.low {
         Status::LowSnr
     } else {
         Status::Ok
@@ -136,13 +119,13 @@ fn planar(
     whitening: &Whitening<'_>,
     inliers: &Observations,
     solution: &mut Solution,
-    evidence: &Evidence<'_>,
+    unknown: bool,
     distinct: f64,
 ) -> bool {
-    let Some(twin) = planar_twin(whitening, inliers, &solution.motion, distinct, evidence.unknown) else {
+    let Some(twin) = planar_twin(whitening, inliers, &solution.motion, distinct, unknown) else {
         return false;
     };
-    let excess = twin.behind - evidence.likelihood.1;
+    let excess = twin.behind - solution.behind;
     if excess >= EXCLUDED {
         return false;
     }
@@ -163,7 +146,11 @@ fn planar(
 fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rng: CounterRng) -> bool {
     let beyond = |most: usize| {
         let fewer = (inliers.n as f64 / inliers.n.min(most) as f64).sqrt();
-        plausible_beyond(inliers, motions, farther(own, likelihood, fewer), most, rng)
+        let farther = Farther {
+            residuals: FAR * own.max(likelihood.min(MAX_LIKELIHOOD_RATIO * own)) * fewer + SPACING,
+            chance: CONSISTENT * own * fewer + SPACING,
+        };
+        plausible_beyond(inliers, motions, farther, most, rng)
     };
     if inliers.n <= SEARCHED {
         return beyond(SEARCHED);
@@ -171,27 +158,6 @@ fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rn
     // Where the standard deviation of few is too large for anything to lie beyond it, these decide nothing.
     let blind = CONSISTENT * own * (inliers.n as f64 / SEARCHED as f64).sqrt() > BLIND;
     (blind || beyond(SEARCHED)) && beyond(ASKED_AGAIN)
-}
-
-/// The same for motions with a quite different rotation.
-fn has_other_rotation(
-    whitening: &Whitening<'_>,
-    inliers: &Observations,
-    solution: &Solution,
-    (own, likelihood): (f64, f64),
-    rng: CounterRng,
-) -> bool {
-    let fewer = (inliers.n as f64 / inliers.n.min(ASKED_AGAIN) as f64).sqrt();
-    let farther = farther(own, likelihood, fewer);
-    plausible_less_turned(whitening, inliers, &solution.motion, farther, ASKED_AGAIN, rng)
-}
-
-/// What is farther than a covariance has it, of points whose standard deviations are `fewer` times larger.
-fn farther(own: f64, likelihood: f64, fewer: f64) -> Farther {
-    Farther {
-        residuals: FAR * own.max(likelihood.min(MAX_LIKELIHOOD_RATIO * own)) * fewer + SPACING,
-        chance: CONSISTENT * own * fewer + SPACING,
-    }
 }
 
 /// Whether the points determine all five unknowns: points at one or a few places, or on a line through the
@@ -223,7 +189,7 @@ pub(crate) fn determined(observations: &Observations, motion: &Motion) -> bool {
 pub(crate) const SURE: f64 = 9.0;
 
 /// The most likely motion near `start` that has no depth behind the camera, and its cost.
-pub(crate) fn in_front(observations: &Observations, start: &Motion) -> (Motion, f64) {
+fn in_front(observations: &Observations, start: &Motion) -> (Motion, f64) {
     let effort = StoppingCriteria { steps: 30, tolerance: 1e-7, deviations: 0.0 };
     let sums = |motion: &Motion, tangent: &Matrix2x3<f64>| front_equations(observations, motion, tangent);
     let found = descend(*start, effort, observations.n, sums);
@@ -232,16 +198,11 @@ pub(crate) fn in_front(observations: &Observations, start: &Motion) -> (Motion, 
 
 /// The opposite of a motion, with the rotation that suits it best and how much less likely it is, in squared
 /// units of noise; `None` where the depths exclude it.
-pub(crate) fn opposite(observations: &Observations, motion: &Motion, rng: CounterRng) -> Option<(Motion, f64)> {
-    let searched = if observations.n > SEARCHED {
-        Cow::Owned(observations.subset(&sample(observations.n, SEARCHED, rng)))
-    } else {
-        Cow::Borrowed(observations)
-    };
-    let (_, cost) = in_front(&searched, motion);
-    let (opposite, other) = in_front(&searched, &motion.reversed());
+fn opposite(observations: &Observations, motion: &Motion, rng: CounterRng) -> Option<(Motion, f64)> {
+    let searched = &*at_most(observations, SEARCHED, rng);
+    let [own, opposite] = [*motion, motion.reversed()].map(|start| in_front(searched, &start));
     // One that turned back is no other motion.
-    let turned = opposite.u().dot(&motion.u()) < 0.0;
-    let excess = (other - cost) * observations.n as f64 / searched.n as f64;
-    (turned && excess < SURE).then_some((opposite, excess))
+    let turned = opposite.0.u().dot(&motion.u()) < 0.0;
+    let excess = (opposite.1 - own.1) * observations.n as f64 / searched.n as f64;
+    (turned && excess < SURE).then_some((opposite.0, excess))
 }

@@ -4,7 +4,7 @@ use super::{APART, INLIER, search};
 use crate::math::random::CounterRng;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{LESS_ROUND, Observations};
-use crate::motion3d::solver::refine::{StoppingCriteria, refine};
+use crate::motion3d::solver::refine::{StoppingCriteria, refine_cut};
 use crate::motion3d::solver::starts::apart;
 use rayon::prelude::*;
 use std::iter::once;
@@ -49,8 +49,8 @@ impl<'a> GraduatedWeights<'a> {
 pub(crate) fn graduated(observations: &Observations, start: Motion, bound: f64) -> Motion {
     let (mut motion, mut cut) = (start, bound);
     while cut > INLIER {
-        motion = refine(observations, motion, Some(cut), StoppingCriteria::ROUGH).motion;
+        motion = refine_cut(observations, motion, cut, StoppingCriteria::ROUGH).motion;
         cut /= CUT_RATIO;
     }
-    refine(observations, motion, Some(INLIER), StoppingCriteria { steps: 30, tolerance: 1e-7, deviations: 0.0 }).motion
+    refine_cut(observations, motion, INLIER, StoppingCriteria { steps: 30, tolerance: 1e-7, deviations: 0.0 }).motion
 }

@@ -110,7 +110,7 @@ fn of_scene(observations: &Observations, mut motion: Motion) -> Option<(Motion, 
         if (fitted.len() as f64) < least {
             return None;
         }
-        motion = refine(&observations.subset(&fitted), motion, None, STOPPING).motion;
+        motion = refine(&observations.subset(&fitted), motion, STOPPING).motion;
         fitted = inliers_of(observations, &motion);
     }
     (fitted.len() as f64 >= least).then_some((motion, fitted))

@@ -34,7 +34,7 @@ use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Scaled};
 use crate::motion3d::model::whitening::Whitening;
-use crate::motion3d::solver::finite_rotation::decides;
+use crate::motion3d::solver::finite_rotation::changes_inliers;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use crate::motion3d::solver::starts::at_most;
 use cells::Cells;
@@ -169,7 +169,7 @@ fn with_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -
         return in_noise(whitening, scaled, false, rng);
     }
     let few = keeps("motion3d.single_noise") && scaled.observations.n < SELECTED;
-    let single_noise = few.then(|| single_noise::noise_std(&scaled.observations, rng)).flatten();
+    let single_noise = few.then(|| single_noise::noise_std(whitening, &scaled.observations, rng)).flatten();
     let single_noise = single_noise.map(|noise_std| noise_std * scaled.noise_std);
     scaled.take(noise_scale::FIRST_SHARE * scaled.observations.median_flow());
     let found = in_noise(whitening, scaled, true, rng)?;
@@ -201,8 +201,8 @@ fn in_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, unknown: bool, rng: 
             changed = (noise_std - 1.0).abs() > SETTLED_NOISE;
             scaled.take(noise_std);
         }
-        let fitted = scaled.observations.subset(&inliers_of(&scaled.observations, &best));
-        if decides(whitening, &fitted, &best) {
+        let inliers = scaled.observations.subset(&inliers_of(&scaled.observations, &best));
+        if changes_inliers(whitening, &inliers, &best) {
             scaled.observations = whitening.derotated(&scaled.observations, best.derotation());
             changed = true;
         }
@@ -238,7 +238,7 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
         if kept.len() < MIN_POINTS || kept.len() == found.inliers.len() {
             break;
         }
-        let motion = refine(&observations.subset(&kept), found.motion, None, STOPPING).motion;
+        let motion = refine(&observations.subset(&kept), found.motion, STOPPING).motion;
         let fitted = inliers_of(observations, &motion);
         found = Consensus::new(motion, fitted);
     }
@@ -344,7 +344,7 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
         if inliers.len() < MIN_POINTS {
             return None;
         }
-        motion = refine(&observations.subset(&inliers), motion, None, STOPPING).motion;
+        motion = refine(&observations.subset(&inliers), motion, STOPPING).motion;
         let next = inliers_of(observations, &motion);
         // Of many points a few always lie on the border.
         let settled = next == inliers

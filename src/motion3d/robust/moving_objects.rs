@@ -67,7 +67,7 @@ fn without(observations: &Observations, found: &Consensus, around: &Neighbourhoo
         if kept == inliers || kept.len() < MIN_POINTS {
             break;
         }
-        motion = refine(&observations.subset(&kept), motion, None, STOPPING).motion;
+        motion = refine(&observations.subset(&kept), motion, STOPPING).motion;
         inliers = kept;
         has_inlier_neighbours = rejected.iter().map(|&share| share <= limit).collect();
     }

@@ -35,7 +35,7 @@ pub(crate) fn deviating_parts(observations: &Observations, motion: &Motion, poin
 
 fn tested_parts(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
     let own = observations.subset(points);
-    let least = refine(&own, *motion, None, StoppingCriteria::FULL);
+    let least = refine(&own, *motion, StoppingCriteria::FULL);
     let whiten = least.equations.h.cholesky()?.l();
     let seen = depths(&own, &least.motion);
     let row = |k: usize| whiten.solve_lower_triangular(&slopes(&own, &least.motion, &least.tangent, seen.nu[k], k));

@@ -39,7 +39,7 @@ pub(crate) fn competing_motion(
 ) -> Option<CompetingMotion> {
     let parts = residual_structure(observations, found, points)?;
     let own = observations.subset(points);
-    let (n, together) = (own.n as f64, refine(&own, *found, None, StoppingCriteria::FULL).equations.cost);
+    let (n, together) = (own.n as f64, refine(&own, *found, StoppingCriteria::FULL).equations.cost);
     let division = Division::of(own);
     let divided = |part: &Vec<u32>| division.from(part, found, rng);
     let two = parts

@@ -6,11 +6,19 @@ use crate::math::median;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::whitening::Whitening;
+use crate::motion3d::solver::finite_rotation::settle;
 use crate::motion3d::solver::likelihood::minima;
 
 /// Estimates the noise of all points if all are inliers of one motion.
-pub(crate) fn noise_std(observations: &Observations, rng: CounterRng) -> Option<f64> {
-    let best = minima(observations, rng.stream(20)).first()?.equations.cost;
+pub(crate) fn noise_std(whitening: &Whitening<'_>, observations: &Observations, rng: CounterRng) -> Option<f64> {
+    let mut found = minima(observations, rng.stream(20));
+    if found.is_empty() {
+        return None;
+    }
+    let mut points = observations.clone();
+    settle(whitening, &mut points, &mut found);
+    let best = found.first()?.equations.cost;
     let degrees = observations.n.saturating_sub(UNKNOWNS).max(1);
     Some((best / degrees as f64).sqrt()).filter(|noise_std| noise_std.is_finite() && *noise_std > 0.0)
 }

@@ -60,7 +60,7 @@ impl Division {
                 *motion = if round < SEARCHES {
                     GraduatedWeights::new(&members).motions(1, rng).pop()?
                 } else {
-                    refine(&members, *motion, None, StoppingCriteria::ROUGH).motion
+                    refine(&members, *motion, StoppingCriteria::ROUGH).motion
                 };
             }
             let next = self.nearer(&motions);
@@ -73,8 +73,7 @@ impl Division {
         if members.iter().any(|members| members.n <= MIN_POINTS) {
             return None;
         }
-        let fitted: [_; 2] =
-            std::array::from_fn(|own| refine(&members[own], motions[own], None, StoppingCriteria::FULL));
+        let fitted: [_; 2] = std::array::from_fn(|own| refine(&members[own], motions[own], StoppingCriteria::FULL));
         let cost = fitted.iter().map(|minimum| minimum.equations.cost).sum();
         let signed: [Motion; 2] = std::array::from_fn(|own| cheaper_sign(&members[own], fitted[own].motion).0);
         let motions = if members[0].n < members[1].n { [signed[1], signed[0]] } else { signed };
@@ -119,7 +118,7 @@ mod tests {
             }
             let part: Vec<u32> = (0..400).filter(|&k| scene.points[k as usize][0] > 0.0).collect();
             let points = scene.observations();
-            let one = refine(&points, oblique(), None, StoppingCriteria::FULL).equations.cost;
+            let one = refine(&points, oblique(), StoppingCriteria::FULL).equations.cost;
             let division = Division::of(points);
             let two = division.from(&part, &oblique(), CounterRng::new(seed)).unwrap();
             let off = [(0, oblique()), (1, object)].map(|(k, truth)| two.motions[k].angle_to(&truth).to_degrees());
@@ -130,7 +129,7 @@ mod tests {
     #[test]
     fn points_that_move_as_one_have_no_second_motion_that_is_worth_it() {
         let points = Scene::oblique(300, 0.02, 1).observations();
-        let one = refine(&points, oblique(), None, StoppingCriteria::FULL).equations.cost;
+        let one = refine(&points, oblique(), StoppingCriteria::FULL).equations.cost;
         let division = Division::of(points);
         let two = division.from(&(0..100).collect::<Vec<u32>>(), &oblique(), CounterRng::new(1));
         assert!(two.is_none_or(|two| two.cost > 0.75 * one));

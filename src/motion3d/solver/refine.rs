@@ -60,7 +60,9 @@ impl Minimum {
 /// The step that solves the damped equations; `None` where they have no solution.
 fn step(equations: &Equations, damping: f64) -> Option<Vector5> {
     let Equations { h, gradient, .. } = equations;
-    let damped = h + SMatrix::from_diagonal(&(h.diagonal() * damping));
+    // What nothing determines stays as it is.
+    let added = h.diagonal().map(|own| if own > 0.0 { damping * own } else { h.trace() });
+    let damped = h + SMatrix::from_diagonal(&added);
     let step = damped.cholesky()?.solve(gradient);
     step.iter().all(|value| value.is_finite()).then_some(step)
 }
@@ -70,29 +72,28 @@ fn squared_deviations(equations: &Equations, step: &Vector5, n: usize) -> f64 {
     step.dot(&(equations.h * step)) * n as f64 / equations.cost
 }
 
-/// The minimum of `J` (with `cut`: of Tukey's loss) that is reached from `start`; the axes of `u` move along
-/// with it.
+/// The minimum of `J` that is reached from `start`; the axes of `u` move along with it.
 ///
 /// The slope of `e` is `-D(nu^)` exactly: these are Gauss-Newton steps.
-pub(crate) fn refine(
-    observations: &Observations,
-    start: Motion,
-    cut: Option<f64>,
-    effort: StoppingCriteria,
-) -> Minimum {
-    descend(start, effort, observations.n, |motion, tangent| equations(observations, motion, tangent, cut))
+pub(crate) fn refine(observations: &Observations, start: Motion, stopping: StoppingCriteria) -> Minimum {
+    descend(start, stopping, observations.n, |motion, tangent| equations(observations, motion, tangent, None))
+}
+
+/// The same of Tukey's loss, which ends at `cut` units of noise.
+pub(crate) fn refine_cut(observations: &Observations, start: Motion, cut: f64, stopping: StoppingCriteria) -> Minimum {
+    descend(start, stopping, observations.n, |motion, tangent| equations(observations, motion, tangent, Some(cut)))
 }
 
 /// The minimum of a cost that is reached from `start`; `sums`: those of `n` measurements at a motion.
 pub(crate) fn descend(
     start: Motion,
-    effort: StoppingCriteria,
+    stopping: StoppingCriteria,
     n: usize,
     sums: impl Fn(&Motion, &Matrix2x3<f64>) -> Equations,
 ) -> Minimum {
     let mut here = Minimum::at(start, &sums);
     let mut damping = 1e-4;
-    for _ in 0..effort.steps {
+    for _ in 0..stopping.steps {
         let Some(change) = step(&here.equations, damping) else {
             damping = (damping * 10.0f64).max(1e-6);
             if damping > 1e12 {
@@ -102,7 +103,7 @@ pub(crate) fn descend(
         };
         let there = Minimum::at(here.motion.stepped(&here.tangent, &change), &sums);
         let deviations = squared_deviations(&here.equations, &change, n).sqrt();
-        let settled = change.norm() < effort.tolerance || deviations < effort.deviations;
+        let settled = change.norm() < stopping.tolerance || deviations < stopping.deviations;
         if there.equations.cost <= here.equations.cost {
             here = there;
             damping *= 0.1;
@@ -128,7 +129,8 @@ mod tests {
         let observations = scene.observations();
         for cut in [None, Some(2.0)] {
             let at = Motion::new([0.5, 0.3, 0.8], [0.03, -0.02, 0.0]);
-            let minimum = |motion: Motion| refine(&observations, motion, cut, StoppingCriteria::NONE);
+            let minimum =
+                |motion: Motion| Minimum::at(motion, |motion, axes| equations(&observations, motion, axes, cut));
             let here = minimum(at);
             for axis in 0..5 {
                 let h = 1e-6;
@@ -148,7 +150,7 @@ mod tests {
     fn exact_flow_gives_the_exact_motion() {
         let scene = Scene::oblique(60, 0.0, 3);
         let near = Motion::of(&(scene.motion.u() + Vector3::new(0.05, -0.04, 0.02)).normalize(), &Vector3::zeros());
-        let found = refine(&scene.observations(), near, None, StoppingCriteria::FULL);
+        let found = refine(&scene.observations(), near, StoppingCriteria::FULL);
         assert!(found.motion.angle_to(&scene.motion) < 1e-9);
         assert!((found.motion.w() - scene.motion.w()).norm() < 1e-9);
     }

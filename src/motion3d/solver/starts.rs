@@ -6,8 +6,7 @@ use crate::math::random::CounterRng;
 use crate::motion3d::kernels::best_rotation;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::tangents;
-use nalgebra::{Vector2, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::borrow::Cow;
 
@@ -20,15 +19,6 @@ pub(crate) const SEARCHED: usize = 1000;
 /// Starts that are refined, and the least angle between them, degrees.
 pub(crate) const STARTS: usize = 5;
 pub(crate) const APART: f64 = 12.0;
-
-/// Directions along each side of a picture that is narrower than this (half of it, rad): there the minimum is
-/// as narrow as the picture, if the epipole lies within. The share of the picture by which these reach beyond
-/// it, starts among them, and the share that these are apart.
-const ACROSS: usize = 12;
-const NARROW: f64 = 0.45;
-const BEYOND: f64 = 0.25;
-const STARTS_WITHIN: usize = 3;
-const APART_WITHIN: f64 = 0.25;
 
 /// Starts among what a few steps on a few points lead to.
 const BASINS: usize = 4;
@@ -63,15 +53,10 @@ pub(crate) fn sample(n: usize, count: usize, rng: CounterRng) -> Vec<u32> {
     chosen
 }
 
-/// Evaluates every direction of the half sphere.
+/// Evaluates every direction of the half sphere, in groups that threads share.
 pub(crate) fn evaluate<R: Send>(work: impl Fn(&Vector3<f64>) -> Option<R> + Sync) -> Vec<R> {
-    each(&half_sphere(), work)
-}
-
-/// Evaluates directions in groups that threads share.
-fn each<R: Send>(directions: &[Vector3<f64>], work: impl Fn(&Vector3<f64>) -> Option<R> + Sync) -> Vec<R> {
     let groups: Vec<Vec<R>> =
-        directions.par_chunks(TOGETHER).map(|group| group.iter().filter_map(&work).collect()).collect();
+        half_sphere().par_chunks(TOGETHER).map(|group| group.iter().filter_map(&work).collect()).collect();
     groups.into_iter().flatten().collect()
 }
 
@@ -101,17 +86,15 @@ pub(crate) fn at_most(observations: &Observations, most: usize, rng: CounterRng)
     }
 }
 
-/// The most promising motions by `J` on at most 1000 random points: the best of the half sphere, the best of
-/// what few steps lead to, and the best within a narrow picture.
+/// The most promising motions by `J` on at most 1000 random points: the best of the half sphere and
+/// the best of what few steps lead to.
 pub(crate) fn starts(observations: &Observations, rng: CounterRng) -> Vec<Motion> {
     let searched = &*at_most(observations, SEARCHED, rng);
     let best = |u: &Vector3<f64>| best_rotation(searched, u).map(|(w, cost)| (Motion::of(u, &w), cost));
     let all = evaluate(best);
     let basins = apart(basins(searched, &all, rng.stream(7)), APART, BASINS);
-    let (within, width) = within(searched);
-    let within = apart(each(&within, best), (APART_WITHIN * width).to_degrees(), STARTS_WITHIN);
     let mut starts: Vec<Motion> = Vec::new();
-    for (motion, _) in apart(all, APART, STARTS).into_iter().chain(basins).chain(within) {
+    for (motion, _) in apart(all, APART, STARTS).into_iter().chain(basins) {
         if !starts.contains(&motion) {
             starts.push(motion);
         }
@@ -127,42 +110,10 @@ fn basins(observations: &Observations, all: &[(Motion, f64)], rng: CounterRng) -
     }
     let few = &*at_most(observations, FEW, rng);
     let descended = |&(motion, _): &(Motion, f64)| {
-        let minimum = refine(few, motion, None, STEPS);
+        let minimum = refine(few, motion, STEPS);
         (minimum.motion, minimum.equations.cost)
     };
     apart(all.to_vec(), APART, all.len()).par_iter().with_min_len(TOGETHER).map(descended).collect()
-}
-
-/// Directions all over a narrow picture and somewhat beyond it, none of a wide one; and the picture's half
-/// width, rad.
-fn within(observations: &Observations) -> (Vec<Vector3<f64>>, f64) {
-    let none = (Vec::new(), 0.0);
-    if !keeps("motion3d.narrow_field_starts") {
-        return none;
-    }
-    let seen = |at: &[f64; 3]| {
-        let along = if observations.spherical { at[2] } else { 1.0 };
-        Vector3::new(at[0], at[1], along).normalize()
-    };
-    let sum: Vector3<f64> = observations.site.iter().map(seen).sum();
-    let Some(middle) = sum.try_normalize(0.0) else { return none };
-    let axes = tangents(&middle);
-    let (mut low, mut high) = (Vector2::repeat(f64::INFINITY), Vector2::repeat(f64::NEG_INFINITY));
-    for direction in observations.site.iter().map(seen) {
-        let along = direction.dot(&middle);
-        if along < NARROW.cos() {
-            return none;
-        }
-        let place = axes * direction / along;
-        (low, high) = (low.inf(&place), high.sup(&place));
-    }
-    let (centre, half) = ((low + high) * 0.5, (high - low) * (0.5 + BEYOND));
-    let step = |i: usize| 2.0 * (i as f64 + 0.5) / ACROSS as f64 - 1.0;
-    let direction = |i: usize| {
-        let at = centre + half.component_mul(&Vector2::new(step(i % ACROSS), step(i / ACROSS)));
-        (middle + axes.transpose() * at).normalize()
-    };
-    ((0..ACROSS * ACROSS).map(direction).collect(), half.max())
 }
 
 #[cfg(test)]
