@@ -122,30 +122,3 @@ pub(super) fn side_offsets(side: usize) -> impl Iterator<Item = i32> + Clone {
 pub(super) fn weight(sigma: Option<f64>, e: f64) -> f64 {
     sigma.map_or(1.0, |s| (-0.5 * (e / s).powi(2)).exp())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn odd_sides_are_centred_and_even_ones_reach_one_further_right() {
-        assert_eq!(side_offsets(5).collect::<Vec<_>>(), [-2, -1, 0, 1, 2]);
-        assert_eq!(side_offsets(4).collect::<Vec<_>>(), [-1, 0, 1, 2]);
-        assert_eq!(Neighbourhood::default().offsets().len(), 9);
-    }
-
-    #[test]
-    fn unusable_neighbourhoods_are_refused_by_name() {
-        let rectangle = |width, height, sigma| Neighbourhood::Rectangle { width, height, sigma };
-        for bad in [
-            rectangle(2, 3, None),
-            rectangle(3, 100_000, None),
-            rectangle(3, 3, Some(0.0)),
-            rectangle(3, 3, Some(f64::NAN)),
-            Neighbourhood::Points { offsets: vec![(0, 0), (1, 0), (0, 0)], sigma: None },
-            Neighbourhood::Points { offsets: vec![(i32::MIN, 0)], sigma: None },
-        ] {
-            assert!(bad.check().unwrap_err().to_string().starts_with("neighbourhood"), "{bad:?}");
-        }
-    }
-}

@@ -68,15 +68,10 @@ impl<T: SimdReal> JetRows<T> {
         Self { reach: stencil.reach(), form }
     }
 
-    /// The same by direct summation over the pixels: the oracle of the separable form.
+    /// The same by direct summation over the pixels.
     fn direct(stencil: &JetStencil) -> Form<T> {
         let taps = stencil.offsets().iter().zip(stencil.weights());
         Form::Direct { taps: taps.map(|(&(x, y), w)| (x, y, w.map(T::from_f64))).collect() }
-    }
-
-    #[cfg(test)]
-    pub fn new_direct(stencil: &JetStencil) -> Self {
-        Self { reach: stencil.reach(), form: Self::direct(stencil) }
     }
 
     /// Values of working memory that [`JetRows::row`] needs for frames of this width.

@@ -65,22 +65,3 @@ pub(super) fn taylor(x: &Axis, y: &Axis) -> [[f64; 6]; 6] {
         [0.0, 0.0, 0.0, 0.0, 0.0, 2.0],
     ]
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn filters_recover_the_orthogonal_coefficients() {
-        for (side, sigma) in [(3, None), (4, None), (7, Some(1.5)), (8, Some(2.0))] {
-            let axis = Axis::new(side, sigma).unwrap();
-            // 2 + 3 p1 - p2.
-            let z = |x: f64| 2.0 + 3.0 * (x - axis.a) - (x * x - axis.b * x - axis.c);
-            for (i, want) in [2.0, 3.0, -1.0].into_iter().enumerate() {
-                let got: f64 = side_offsets(side).zip(&axis.filters[i]).map(|(x, w)| w * z(f64::from(x))).sum();
-                assert!((got - want).abs() < 1e-12, "{side} {sigma:?} {i}: {got}");
-            }
-        }
-        assert!(Axis::new(3, Some(0.05)).is_none());
-    }
-}

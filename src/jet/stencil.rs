@@ -251,6 +251,3 @@ fn freedom(offsets: &[(i32, i32)], weights: &[[f64; 6]]) -> f64 {
     let square: f64 = (0..6).flat_map(|i| (0..6).map(move |j| (i, j))).map(|(i, j)| bb[i][j] * ww[i][j]).sum();
     offsets.len() as f64 - 12.0 + square
 }
-
-#[cfg(test)]
-mod tests;

@@ -85,3 +85,57 @@ fn six_pixels_leave_no_residual() {
     assert!(stencil.noise_variance(&Frame::filled(5, 5, 1.0), 2, 2).is_none());
     assert!(square(3).noise_variance(&Frame::filled(5, 5, 1.0), 0, 2).unwrap().is_nan());
 }
+
+#[test]
+fn quadratics_are_recovered_exactly_in_units_of_the_pitch() {
+    let jet = [90.0, 3.0, -2.0, 0.7, -0.4, 0.3];
+    let (dx, dy) = (0.5, 2.0);
+    let design_row = |x: f64, y: f64| [1.0, x, y, 0.5 * x * x, x * y, 0.5 * y * y];
+    let value = |x: usize, y: usize| {
+        let row = design_row((x as f64 - 8.0) * dx, (y as f64 - 7.0) * dy);
+        row.iter().zip(jet).map(|(b, i)| b * i).sum::<f64>()
+    };
+    let frame = Frame::from_fn(18, 17, value);
+    let rectangle = |width, height, sigma| Neighbourhood::Rectangle { width, height, sigma };
+    let ring = (0..8).map(|k| f64::from(k) * std::f64::consts::FRAC_PI_4);
+    let mut offsets: Vec<_> = ring.map(|a| ((3.0 * a.cos()).round() as i32, (3.0 * a.sin()).round() as i32)).collect();
+    offsets.push((1, 0));
+    let shapes = [
+        rectangle(3, 3, None),
+        rectangle(4, 4, None),
+        rectangle(9, 5, Some(1.5)),
+        rectangle(8, 7, Some(2.5)),
+        Neighbourhood::Points { offsets, sigma: None },
+    ];
+    for shape in shapes {
+        let stencil = JetStencil::new(&shape, (dx, dy)).unwrap();
+        for (got, want) in stencil.at(&frame, 8, 7).into_iter().zip(jet) {
+            assert!((got - want).abs() < 1e-10, "{shape:?}: {got} {want}");
+        }
+        assert!(stencil.noise_variance(&frame, 8, 7).unwrap() < 1e-20);
+    }
+}
+
+#[test]
+fn odd_sides_are_centred_and_even_ones_reach_one_further_right() {
+    let offsets = |width| Neighbourhood::Rectangle { width, height: 3, sigma: None }.offsets();
+    let row = |width: usize| offsets(width)[..width].iter().map(|(x, _)| *x).collect::<Vec<_>>();
+    assert_eq!((row(5), row(4)), (vec![-2, -1, 0, 1, 2], vec![-1, 0, 1, 2]));
+    assert_eq!(Neighbourhood::default().offsets().len(), 9);
+}
+
+#[test]
+fn unusable_neighbourhoods_are_refused_by_name() {
+    let rectangle = |width, height, sigma| Neighbourhood::Rectangle { width, height, sigma };
+    for bad in [
+        rectangle(2, 3, None),
+        rectangle(3, 100_000, None),
+        rectangle(3, 3, Some(0.0)),
+        rectangle(3, 3, Some(f64::NAN)),
+        Neighbourhood::Points { offsets: vec![(0, 0), (1, 0), (0, 0)], sigma: None },
+        Neighbourhood::Points { offsets: vec![(i32::MIN, 0)], sigma: None },
+    ] {
+        let message = JetStencil::new(&bad, (1.0, 1.0)).unwrap_err().to_string();
+        assert!(message.starts_with("neighbourhood"), "{bad:?}: {message}");
+    }
+}
