@@ -25,7 +25,7 @@ pub mod coarse_to_fine;
 pub mod derived;
 mod estimator;
 pub mod instantaneous;
-mod least_squares;
+pub mod least_squares;
 mod methods;
 pub mod model;
 mod moment_filter;

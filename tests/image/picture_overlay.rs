@@ -80,3 +80,17 @@ fn what_is_not_known_is_left_out() {
     unknown.bounds = TargetBox::about([1e300, -1e300], 3.0, 3.0);
     drawn(overlay, &unknown, &[([f64::NAN; 2], TrackStatus::Out), ([1e300; 2], TrackStatus::Out)]);
 }
+
+#[test]
+fn the_ellipse_has_the_axes_of_the_covariance() {
+    // The 0.95 quantile with two degrees of freedom.
+    let chi_squared = 5.991_464_547_107_979;
+    let mut state = state();
+    state.covariance[0][0][0] = 36.0 / chi_squared;
+    state.covariance[1][0][0] = 144.0 / chi_squared;
+    let picture = drawn(TrackOverlay::default(), &state, &[]);
+    for (x, y) in [(24, 20), (36, 20), (30, 8), (30, 32)] {
+        assert_ne!(picture.pixel(x, y), GREY, "{x} {y}");
+    }
+    assert_eq!(picture.pixel(18, 20), GREY);
+}

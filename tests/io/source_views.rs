@@ -25,3 +25,31 @@ fn pairs_come_in_step_and_the_first_view_is_the_left_one() {
     uneven.next_pair().unwrap();
     assert!(uneven.next_pair().unwrap_err().to_string().contains("fewer left than right"));
 }
+
+#[test]
+fn frames_are_cut_in_halves() {
+    let frame = Frame::from_fn(4, 2, |x, y| (10 * y + x) as u8);
+    let [left, right] = ViewLayout::SideBySide.cut(&frame).unwrap();
+    assert_eq!((left.data(), right.data()), (&[0, 1, 10, 11][..], &[2, 3, 12, 13][..]));
+    let [upper, lower] = ViewLayout::TopBottom.cut(&frame).unwrap();
+    assert_eq!((upper.data(), lower.data()), (&[0, 1, 2, 3][..], &[10, 11, 12, 13][..]));
+    let odd = ViewLayout::SideBySide.cut(&Frame::filled(3, 2, 0u8)).unwrap_err();
+    assert!(odd.to_string().starts_with("layout: "));
+}
+
+#[test]
+fn squeezed_views_are_stretched_again() {
+    let frame = Frame::new(4, 2, vec![0.0f32, 8.0, 40.0, 48.0, 80.0, 88.0, 120.0, 160.0]).unwrap();
+    let [left, right] = ViewLayout::HalfSideBySide.cut(&frame).unwrap();
+    assert_eq!((left.size(), left.row(0)), ((4, 2), &[0.0, 2.0, 6.0, 8.0][..]));
+    assert_eq!(right.row(1), [120.0, 130.0, 150.0, 160.0]);
+    let [upper, lower] = ViewLayout::HalfTopBottom.cut(&frame).unwrap();
+    assert_eq!((upper.size(), upper.row(1)), ((4, 2), &[0.0, 8.0, 40.0, 48.0][..]));
+    assert_eq!(lower.row(0), [80.0, 88.0, 120.0, 160.0]);
+    // A ramp comes back as it was squeezed, but for the ends.
+    let ramp = Frame::from_fn(8, 1, |x, _| (10 * x) as u8);
+    let squeezed = Frame::from_fn(8, 1, |x, _| (20 * (x % 4) + 5) as u8);
+    let [again, _] = ViewLayout::HalfSideBySide.cut(&squeezed).unwrap();
+    assert_eq!(again.data()[1..7], ramp.data()[1..7]);
+    assert!(ViewLayout::HalfSideBySide.cut(&Frame::filled(3, 2, 0u8)).is_err());
+}

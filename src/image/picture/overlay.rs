@@ -162,33 +162,3 @@ fn ellipse(state: &TrackState) -> Vec<[f64; 2]> {
     let angle = |k: usize| std::f64::consts::TAU * k as f64 / ELLIPSE_STROKES as f64;
     (0..ELLIPSE_STROKES).map(|k| [x + rx * angle(k).cos(), y + ry * angle(k).sin()]).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::types::TargetBox;
-
-    const GREY: Rgb = [90; 3];
-
-    fn state() -> TrackState {
-        TrackState::at([30.0, 20.0], TargetBox::about([30.0, 20.0], 20.0, 10.0))
-    }
-
-    fn drawn(overlay: TrackOverlay, state: &TrackState, path: &[PathPoint]) -> Picture {
-        let mut picture = Picture::filled(64, 48, GREY);
-        overlay.draw(&mut picture, 1, state, path);
-        picture
-    }
-
-    #[test]
-    fn the_ellipse_has_the_axes_of_the_covariance() {
-        let mut state = state();
-        state.covariance[0][0][0] = 36.0 / CHI_SQUARED_95;
-        state.covariance[1][0][0] = 144.0 / CHI_SQUARED_95;
-        let picture = drawn(TrackOverlay::default(), &state, &[]);
-        for (x, y) in [(24, 20), (36, 20), (30, 8), (30, 32)] {
-            assert_ne!(picture.pixel(x, y), GREY, "{x} {y}");
-        }
-        assert_eq!(picture.pixel(18, 20), GREY);
-    }
-}

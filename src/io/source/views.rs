@@ -18,6 +18,24 @@ pub enum ViewLayout {
 }
 
 impl ViewLayout {
+    /// The left or upper half, and the other one, as wide and as high as they were.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `layout` for an odd number of columns or rows.
+    pub fn cut<T: Sample>(self, frame: &Frame<T>) -> Result<[Frame<T>; 2]> {
+        let (width, height) = frame.size();
+        let beside = self.beside();
+        let divided = if beside { width } else { height };
+        if !divided.is_multiple_of(2) {
+            let expected = "frames of an even width (side-by-side) or height (top-bottom)";
+            return Err(Error::argument("layout", expected, divided));
+        }
+        let (w, h) = if beside { (width / 2, height) } else { (width, height / 2) };
+        let (dx, dy) = if beside { (w, 0) } else { (0, h) };
+        let views = [0, 1].map(|half| Frame::from_fn(w, h, |x, y| frame.get(x + half * dx, y + half * dy)));
+        Ok(if self.squeezed() { views.map(|view| stretched(&view, beside)) } else { views })
+    }
+
     /// Whether the views stand beside one another.
     fn beside(self) -> bool {
         matches!(self, Self::SideBySide | Self::HalfSideBySide)
@@ -126,10 +144,10 @@ impl ViewPairs {
 /// Both views of a frame that holds them.
 fn halves(frame: &AnyFrame, layout: ViewLayout) -> Result<[AnyFrame; 2]> {
     match frame {
-        AnyFrame::U8(frame) => Ok(cut(frame, layout)?.map(AnyFrame::U8)),
-        AnyFrame::U16(frame) => Ok(cut(frame, layout)?.map(AnyFrame::U16)),
-        AnyFrame::F32(frame) => Ok(cut(frame, layout)?.map(AnyFrame::F32)),
-        AnyFrame::F64(frame) => Ok(cut(frame, layout)?.map(AnyFrame::F64)),
+        AnyFrame::U8(frame) => Ok(layout.cut(frame)?.map(AnyFrame::U8)),
+        AnyFrame::U16(frame) => Ok(layout.cut(frame)?.map(AnyFrame::U16)),
+        AnyFrame::F32(frame) => Ok(layout.cut(frame)?.map(AnyFrame::F32)),
+        AnyFrame::F64(frame) => Ok(layout.cut(frame)?.map(AnyFrame::F64)),
     }
 }
 
@@ -153,53 +171,4 @@ fn stretched<T: Sample>(frame: &Frame<T>, wider: bool) -> Frame<T> {
         };
         T::from_f64_nearest(0.75 * own.to_real::<f64>() + 0.25 * other.to_real::<f64>())
     })
-}
-
-/// The left or upper half, and the other one, as wide and as high as they were.
-fn cut<T: Sample>(frame: &Frame<T>, layout: ViewLayout) -> Result<[Frame<T>; 2]> {
-    let (width, height) = frame.size();
-    let beside = layout.beside();
-    let divided = if beside { width } else { height };
-    if !divided.is_multiple_of(2) {
-        let expected = "frames of an even width (side-by-side) or height (top-bottom)";
-        return Err(Error::argument("layout", expected, divided));
-    }
-    let (w, h) = if beside { (width / 2, height) } else { (width, height / 2) };
-    let (dx, dy) = if beside { (w, 0) } else { (0, h) };
-    let views = [0, 1].map(|half| Frame::from_fn(w, h, |x, y| frame.get(x + half * dx, y + half * dy)));
-    Ok(if layout.squeezed() { views.map(|view| stretched(&view, beside)) } else { views })
-}
-
-#[cfg(test)]
-mod tests {
-
-    use super::*;
-
-    #[test]
-    fn frames_are_cut_in_halves() {
-        let frame = Frame::from_fn(4, 2, |x, y| (10 * y + x) as u8);
-        let [left, right] = cut(&frame, ViewLayout::SideBySide).unwrap();
-        assert_eq!((left.data(), right.data()), (&[0, 1, 10, 11][..], &[2, 3, 12, 13][..]));
-        let [upper, lower] = cut(&frame, ViewLayout::TopBottom).unwrap();
-        assert_eq!((upper.data(), lower.data()), (&[0, 1, 2, 3][..], &[10, 11, 12, 13][..]));
-        let odd = cut(&Frame::filled(3, 2, 0u8), ViewLayout::SideBySide).unwrap_err();
-        assert!(odd.to_string().starts_with("layout: "));
-    }
-
-    #[test]
-    fn squeezed_views_are_stretched_again() {
-        let frame = Frame::new(4, 2, vec![0.0f32, 8.0, 40.0, 48.0, 80.0, 88.0, 120.0, 160.0]).unwrap();
-        let [left, right] = cut(&frame, ViewLayout::HalfSideBySide).unwrap();
-        assert_eq!((left.size(), left.row(0)), ((4, 2), &[0.0, 2.0, 6.0, 8.0][..]));
-        assert_eq!(right.row(1), [120.0, 130.0, 150.0, 160.0]);
-        let [upper, lower] = cut(&frame, ViewLayout::HalfTopBottom).unwrap();
-        assert_eq!((upper.size(), upper.row(1)), ((4, 2), &[0.0, 8.0, 40.0, 48.0][..]));
-        assert_eq!(lower.row(0), [80.0, 88.0, 120.0, 160.0]);
-        // A ramp comes back as it was squeezed, but for the ends.
-        let ramp = Frame::from_fn(8, 1, |x, _| (10 * x) as u8);
-        let squeezed = Frame::from_fn(8, 1, |x, _| (20 * (x % 4) + 5) as u8);
-        let [again, _] = cut(&squeezed, ViewLayout::HalfSideBySide).unwrap();
-        assert_eq!(again.data()[1..7], ramp.data()[1..7]);
-        assert!(cut(&Frame::filled(3, 2, 0u8), ViewLayout::HalfSideBySide).is_err());
-    }
 }
