@@ -1,19 +1,17 @@
 //! Experiment design: what a layout of points, a field of view and a noise allow.
 
+use super::estimate::MIN_POINTS;
 use super::kernels::{equations, information, slopes};
 use super::model::input::{Flow, Noise, Placement};
 use super::model::motion::Motion;
 use super::model::observations::Observations;
 use super::model::result::{axes, nested};
-use super::model::rows::{Matrix5, Vector5, tangents};
+use super::model::rows::{Matrix5, tangents};
 use super::model::whitening::Whitening;
 use super::solver::covariance::{determined, direction_deviation};
 use crate::error::{Error, Result, numbers};
 use crate::parallel::Threads;
 use nalgebra::Matrix2x3;
-
-/// Least number of points for a motion.
-const MIN_POINTS: usize = 5;
 
 /// Covariances of `(psi, w)` that theory predicts, rad and rad/frame, in the axes `tangent`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -144,13 +142,9 @@ fn weighted_noise(
 ) -> Matrix5 {
     let mut sum = Matrix5::zeros();
     for k in 0..observations.n {
-        let s2 = (observations.row(k).g * motion.u()).norm_squared();
-        if s2 <= observations.floor {
-            continue;
-        }
-        let far = slopes(observations, motion, tangent, 1.0, k);
-        let along = far.fixed_rows::<2>(0).into_owned();
-        let d = Vector5::new(nu[k] * along.x, nu[k] * along.y, far[2], far[3], far[4]);
+        let [d, far] = [nu[k], 1.0].map(|nu| slopes(observations, motion, tangent, nu, k));
+        let along = far.fixed_rows::<2>(0);
+        let s2 = (observations.row(k).g * motion.u()).norm_squared().max(observations.floor);
         let mut block = sum.fixed_view_mut::<2, 2>(0, 0);
         block += along * along.transpose() * (d.dot(&(bound * d)) / s2);
     }

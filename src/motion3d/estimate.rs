@@ -16,7 +16,7 @@ use crate::error::Result;
 use crate::math::random::CounterRng;
 
 /// Least number of points for a motion.
-const MIN_POINTS: usize = 5;
+pub(crate) const MIN_POINTS: usize = 5;
 
 /// The rigid motion that explains a flow field, with covariance and depths.
 ///
@@ -43,9 +43,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     if let Some(depths) = &options.weight_depths {
         let known = |k: &u32| depths[scaled.observations.source[*k as usize] as usize].is_finite();
         let chosen: Vec<u32> = (0..scaled.observations.n as u32).filter(known).collect();
-        if chosen.len() < scaled.observations.n {
-            scaled.observations = scaled.observations.subset(&chosen);
-        }
+        scaled.observations = scaled.observations.subset(&chosen);
     }
     if scaled.observations.n < MIN_POINTS {
         let noise_std = if scaled.unknown { f64::NAN } else { noise_std };
@@ -71,52 +69,40 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     {
         scaled.observations = turned;
     }
-    if scaled.unknown
-        && options.robust
-        && let Some(rotation) = explained_by_rotation_in_unknown_noise(&scaled.observations, 0.0)
-    {
+    let still = match (options.robust, scaled.unknown) {
         // Nothing is left that noise could be estimated from, but for rounding.
-        let (before, left) = (scaled.noise_std, (rotation.chi2 / (2 * scaled.observations.n - 3) as f64).sqrt());
-        scaled.take(left);
-        let (all, rotation) = (&scaled.observations, rotation.in_units(before / scaled.noise_std));
+        (true, true) => explained_by_rotation_in_unknown_noise(&scaled.observations, 0.0).map(|rotation| {
+            let before = scaled.noise_std;
+            scaled.take((rotation.chi2 / (2 * scaled.observations.n - 3) as f64).sqrt());
+            rotation.in_units(before / scaled.noise_std)
+        }),
+        (false, false) => explained_by_rotation(&scaled.observations),
+        _ => None,
+    };
+    if let Some(rotation) = still {
+        let all = &scaled.observations;
         return rotation_report(flow, all, all, &rotation, scaled.noise_std, options);
     }
-    if options.robust {
-        let Some(kept) = consensus(&whitening, &mut scaled, rng.stream(1)) else {
-            return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.noise_std);
-        };
-        let inner = scaled.observations.subset(&kept.inner);
-        let task = Task { whitening: &whitening, options, known: Some(&kept), rng };
-        let found = task.on(&mut scaled, inner);
-        let found = with_all_inliers(found, &scaled.observations, &kept);
-        doubted(found, &scaled.observations, &kept)
-    } else {
-        if !scaled.unknown
-            && let Some(rotation) = explained_by_rotation(&scaled.observations)
-        {
-            return rotation_report(
-                flow,
-                &scaled.observations,
-                &scaled.observations,
-                &rotation,
-                scaled.noise_std,
-                options,
-            );
-        }
+    if !options.robust {
         let inliers = scaled.observations.clone();
-        Task { whitening: &whitening, options, known: None, rng }.on(&mut scaled, inliers)
+        return Task { whitening: &whitening, options, known: None, rng }.on(&mut scaled, inliers);
     }
+    let Some(kept) = consensus(&whitening, &mut scaled, rng.stream(1)) else {
+        return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.noise_std);
+    };
+    let inner = scaled.observations.subset(&kept.inner);
+    let found = Task { whitening: &whitening, options, known: Some(&kept), rng }.on(&mut scaled, inner);
+    doubted(with_all_inliers(found, &scaled.observations, &kept), &scaled.observations, &kept)
 }
 
 /// The inliers of one motion, judged by their own errors.
 fn consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let own = scaled.observations.own();
     scaled.observations.rescale(1.0 / own);
-    let found = robust::consensus(whitening, scaled, rng);
+    let mut found = robust::consensus(whitening, scaled, rng);
     scaled.observations.rescale(own);
-    let mut found = found?;
-    for competitor in &mut found.competing {
+    for competitor in found.iter_mut().flat_map(|found| &mut found.competing) {
         competitor.excess *= own * own;
     }
-    Some(found)
+    found
 }

@@ -151,8 +151,8 @@ impl Task<'_, '_> {
         if wanted || !linear {
             improved = smoothed(inliers, self.options, motion, &mut made.unwrap_or_else(|| self.smoother(inliers)));
         }
-        // Maximum likelihood alone is undetermined beyond its theory; a minimum from where smoothed weights lead
-        // nowhere is spurious.
+        // Maximum likelihood alone is undetermined beyond its theory; a minimum from where smoothed weights
+        // lead nowhere is spurious.
         let mut described = !bent && !wanted;
         if let Some(best) = &mut improved {
             (best.covariance, described) = best.lengthened(inliers, || self.smoother(inliers));

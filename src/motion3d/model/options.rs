@@ -9,9 +9,6 @@ use crate::error::{Error, Result, numbers};
 use crate::parallel::Threads;
 use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
 
-/// Largest common displacement: squares of larger ones are not finite.
-const MAX_BIAS: f64 = 1e100;
-
 /// Which estimator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
@@ -114,7 +111,12 @@ impl MotionOptions {
             let expected = format!("{} values, one for each point", flow.len());
             return Err(Error::argument("weight_inv_depth", expected, depths.len()));
         }
-        self.check_in_front()?;
+        // Depths have any unit, but no sign that could be turned: what is behind the camera is not seen.
+        let finite = || self.weight_depths.iter().flatten().filter(|nu| nu.is_finite());
+        if finite().count() > 0 && !finite().any(|&nu| nu > 0.0) {
+            let expected = "inverse depths of points before the camera, which are positive";
+            return Err(Error::argument("weight_inv_depth", expected, "none above 0"));
+        }
         if let Some(prior) = self.rotation_prior.as_ref().filter(|prior| prior.information().is_none()) {
             let expected = "a finite rotation with a positive definite covariance";
             let (rotation, covariance) = (numbers(&prior.rotation), numbers(prior.covariance.as_flattened()));
@@ -123,17 +125,6 @@ impl MotionOptions {
         self.check_initial()?;
         self.check_common(flow.projection())?;
         self.check_correlation(noise)
-    }
-
-    /// Depths have any unit, but no sign that could be turned: what is behind the camera is not seen.
-    fn check_in_front(&self) -> Result<()> {
-        let Some(depths) = &self.weight_depths else { return Ok(()) };
-        let mut finite = depths.iter().filter(|nu| nu.is_finite()).peekable();
-        if finite.peek().is_none() || finite.any(|&nu| nu > 0.0) {
-            return Ok(());
-        }
-        let got = "none above 0";
-        Err(Error::argument("weight_inv_depth", "inverse depths of points before the camera, which are positive", got))
     }
 
     fn check_initial(&self) -> Result<()> {
@@ -158,15 +149,13 @@ impl MotionOptions {
         if !(0.0..=1.0).contains(&scale) {
             return Err(Error::argument("flow_scale_std", "a number from 0 to 1", scale));
         }
-        if !(0.0..=MAX_BIAS).contains(&offset) {
-            return Err(Error::argument("flow_bias_std", format!("a number from 0 to {MAX_BIAS:e}"), offset));
+        // Squares of larger ones are not finite.
+        if !(0.0..=1e100).contains(&offset) {
+            return Err(Error::argument("flow_bias_std", "a number from 0 to 1e100", offset));
         }
         if projection == Projection::Sphere && offset > 0.0 {
-            return Err(Error::argument(
-                "flow_bias_std",
-                "0 on the sphere, whose flow has no common displacement",
-                offset,
-            ));
+            let expected = "0 on the sphere, whose flow has no common displacement";
+            return Err(Error::argument("flow_bias_std", expected, offset));
         }
         Ok(())
     }

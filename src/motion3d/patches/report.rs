@@ -85,27 +85,17 @@ pub(crate) fn judge(
 ) {
     let own = out.direction_std;
     let likelihood = direction_deviation(&Matrix5::from_fn(|i, j| out.likelihood.covariance[i][j]));
-    let distinct = (DISTINCT * own).to_radians().max(1e-6);
-    let twin = system.planar_twin(&out.motion);
-    let twin = twin.filter(|twin| twin.angle_to(&out.motion).min(twin.reversed().angle_to(&out.motion)) > distinct);
-    out.alternatives.extend(twin.map(|motion| Alternative { motion, excess: 0.0 }));
-    let found = others(system, &out.motion, minima, if own.is_finite() { own } else { 0.0 });
-    let doubtful = !found.is_empty();
-    for other in found {
-        if out.alternatives.iter().all(|known| known.motion.angle_to(&other.motion).to_degrees() > APART) {
-            out.alternatives.push(other);
-        }
-    }
+    out.alternatives = others(system, &out.motion, minima, if own.is_finite() { own } else { 0.0 });
     // Not a number where it is not known.
     let deviation = own.max(likelihood);
     out.status = if places < FEW {
         Status::FewPoints
-    } else if twin.is_some() {
-        Status::Ambiguous
-    } else if own.is_nan() || own > WIDE || far(system, &[out.motion, minima[0]], deviation, rng) {
+    } else if own.is_nan() || own > WIDE {
         Status::IllConditioned
-    } else if doubtful {
+    } else if !out.alternatives.is_empty() {
         Status::Ambiguous
+    } else if far(system, &[out.motion, minima[0]], deviation, rng) {
+        Status::IllConditioned
     } else if low {
         Status::LowSnr
     } else {

@@ -1,6 +1,5 @@
 //! Whitened patches and the sums over them, as those of points.
 
-use crate::math::by_chance;
 use crate::motion3d::diagnostics::rotation_only::RotationOnly;
 use crate::motion3d::kernels::Equations;
 use crate::motion3d::model::motion::Motion;
@@ -15,7 +14,6 @@ type Matrix6x3 = SMatrix<f64, 6, 3>;
 /// One patch: `f = A(u) lambda + R w + noise` with unit covariance, `A` linear in `u`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Patch {
-    point: [f64; 2],
     rows: AffineRows,
     /// `V'` of the rotation that was taken out of displacements, else the identity.
     mean: Matrix3<f64>,
@@ -61,7 +59,7 @@ impl Patch {
         let rows = AffineRows::new(point);
         let mean = turn.map_or_else(Matrix3::identity, |turn| turn.mean);
         let m = turn.map_or(*m, |turn| m + rows.rotation * turn.rotation);
-        let patch = Self { point, rows, mean, whiten, r: whiten * rows.rotation * mean, f: whiten * m };
+        let patch = Self { rows, mean, whiten, r: whiten * rows.rotation * mean, f: whiten * m };
         let finite = patch.r.iter().chain(patch.f.iter()).chain(whiten.iter()).all(|value| value.is_finite());
         finite.then_some(patch)
     }
@@ -250,38 +248,5 @@ impl System {
             sum += patch.surface_noise(tangent, &seen.covariance, &(across * bound * across.transpose()));
         }
         sum
-    }
-
-    /// The other motion, where all patches lie in one plane `nu = n . eta` within their noise
-    /// and that has them before the camera.
-    pub fn planar_twin(&self, motion: &Motion) -> Option<Motion> {
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        let plane = |patch: &Patch| Matrix3::new(patch.point[0], patch.point[1], 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0);
-        let seen: Vec<_> = self.patches.iter().map(|patch| (plane(patch), patch.seen(motion))).collect();
-        for (at, seen) in &seen {
-            let weight = seen.covariance.try_inverse()?;
-            normal += at.transpose() * weight * at;
-            right += at.transpose() * weight * seen.surface;
-        }
-        let n = normal.cholesky()?.solve(&right);
-        let chi2: f64 = seen
-            .iter()
-            .map(|(at, seen)| {
-                let rest = seen.surface - at * n;
-                seen.covariance.try_inverse().map_or(0.0, |weight| (rest.transpose() * weight * rest)[0])
-            })
-            .sum();
-        if self.patches.len() < 2 || !by_chance(chi2, (3 * self.patches.len() - 3) as f64) || n.norm() <= 0.0 {
-            return None;
-        }
-        // In the axes half way the translation is V' u and rotations are V' w.
-        let mean = self.patches.first()?.mean;
-        let back = mean.try_inverse()?;
-        let other = Motion::of(&(back * n).normalize(), &(motion.w() + back * n.cross(&(mean * motion.u()))));
-        let behind = |motion: &Motion| self.equations(motion, &tangents(&motion.u()), None).behind;
-        let own = behind(motion);
-        let (one, two) = (behind(&other), behind(&other.reversed()));
-        let (twin, least) = if two < one { (other.reversed(), two) } else { (other, one) };
-        (least - own < 25.0).then_some(twin)
     }
 }
