@@ -33,5 +33,3 @@ pub use structure_tensor::StructureTensor;
 
 pub(crate) use finite::all_finite;
 pub(crate) use quantise::are_rounded;
-#[allow(unused_imports)] // offered to the estimators that blur product planes
-pub(crate) use smooth::{SeparableKernel, convolve_separable};
