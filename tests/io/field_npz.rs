@@ -87,7 +87,7 @@ fn parameters_that_the_model_lacks_are_zero_but_not_where_there_is_no_estimate()
 
 #[test]
 fn arrays_that_do_not_fit_are_refused() {
-    let field = numbered(SamplingGrid::default());
+    let field = FlowField::<f32>::empty(numbered(SamplingGrid::default()).layout, false).unwrap();
     let metadata = stored(&field).text("metadata").unwrap();
     let mut npz = NpzWriter::new(Cursor::new(Vec::new()), "x");
     npz.text("metadata", &metadata).unwrap();
