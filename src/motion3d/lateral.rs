@@ -163,12 +163,8 @@ fn is_finite(flow: &[f64; 2]) -> bool {
 
 /// The sign of an axis that leaves less behind the camera, in squared standard deviations.
 fn in_front(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
-    let (mut plus, mut minus) = (0.0, 0.0);
-    for f in flow.iter().filter(|f| is_finite(f)) {
-        let along = axis.dot(&Vector2::from(*f));
-        *(if along < 0.0 { &mut plus } else { &mut minus }) += along * along;
-    }
-    if plus <= minus { axis } else { -axis }
+    let along = flow.iter().filter(|f| is_finite(f)).map(|f| axis.dot(&Vector2::from(*f)));
+    if along.map(|along| along * along.abs()).sum::<f64>() < 0.0 { -axis } else { axis }
 }
 
 /// The direction of a translation along the image plane (`u_z = 0`) of a camera that does not turn, from flow

@@ -75,8 +75,7 @@ pub struct FieldPoints {
     /// How far errors of neighbours go together, px: the field's own. For
     /// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions).
     pub correlation_length: f64,
-    /// What the flow of the whole field may have in common, estimated from its covariances. For
-    /// [`MotionOptions::common`](crate::motion3d::MotionOptions).
+    /// What the flow of the whole field may have in common, estimated from its covariances.
     pub common: CommonErrors,
     /// The spacing that came out of the options, px.
     pub spacing: f64,

@@ -24,8 +24,7 @@ pub struct FieldPatches {
     pub motion: Vec<[f64; 6]>,
     /// Covariances of the six numbers, 36 values a patch, row by row.
     pub covariances: Vec<f64>,
-    /// What the flow of the whole field may have in common, estimated from its covariances. For
-    /// [`MotionOptions::common`](crate::motion3d::MotionOptions).
+    /// What the flow of the whole field may have in common, estimated from its covariances.
     pub common: CommonErrors,
 }
 

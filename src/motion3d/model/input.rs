@@ -4,7 +4,7 @@
 use super::rows::tangents;
 use crate::error::{Error, Result, number, numbers};
 use crate::types::FlowField;
-use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, Vector3};
+use nalgebra::{Matrix2, Matrix3, Matrix6, SMatrix, Vector3};
 
 /// Points with their flow, N of each.
 #[derive(Debug, Clone, Copy)]
@@ -94,51 +94,69 @@ impl Flow<'_> {
         }
     }
 
-    /// Whether all covariances that are finite are some; on the sphere only across the bearing, where the
-    /// flow is.
-    fn check_covariances(&self, covariances: &[f64], values: usize) -> Result<()> {
-        for (k, given) in covariances.chunks_exact(values).enumerate() {
-            let good = match self {
-                Self::Plane { .. } => is_covariance(&DMatrix::from_row_slice(2, 2, given)),
-                Self::Sphere { bearings, .. } => {
-                    let axes = tangents(&Vector3::from(bearings[k]).normalize());
-                    let given = Matrix3::from_row_slice(given);
-                    let across = axes * given * axes.transpose();
-                    symmetric(given.as_slice(), 3)
-                        && is_covariance(&DMatrix::from_column_slice(2, 2, across.as_slice()))
-                }
-            };
-            if !good {
-                return Err(not_covariance(k, given));
-            }
-        }
-        Ok(())
-    }
-
     pub(crate) fn check(&self, noise: &Noise<'_>) -> Result<()> {
-        let (points, flow, values) = match self {
-            Self::Plane { points, flow, .. } => (points.len(), flow.len(), 4),
-            Self::Sphere { bearings, flow } => (bearings.len(), flow.len(), 9),
+        let flow = match self {
+            Self::Plane { flow, .. } => flow.len(),
+            Self::Sphere { flow, .. } => flow.len(),
         };
-        if points != flow {
-            return Err(Error::argument("flow", format!("{points} values, one for each point"), flow));
-        }
+        check_lengths(self.len(), flow)?;
         if let Self::Sphere { bearings, .. } = self {
             let off = |b: &&[f64; 3]| (b[0].hypot(b[1]).hypot(b[2]) - 1.0).abs() > 1e-3;
             if let Some(wrong) = bearings.iter().find(off) {
                 return Err(Error::argument("points", "bearings of length 1", numbers(wrong)));
             }
         }
-        match noise {
-            Noise::StandardDeviation(noise_std) => check_noise_std(*noise_std),
-            Noise::Covariances(c) if c.len() != values * points => {
-                let expected = format!("{points} matrices of {values} values");
-                Err(Error::argument("cov", expected, format!("{} values", c.len())))
+        match (noise, self) {
+            (Noise::StandardDeviation(noise_std), _) => check_noise_std(*noise_std),
+            (Noise::Covariances(given), Self::Plane { points, .. }) => {
+                check_covariances::<2>(points.len(), given, |_, given| is_positive(given))
             }
-            Noise::Covariances(c) => self.check_covariances(c, values),
-            Noise::Unknown => Ok(()),
+            // Only across the bearing, where the flow is.
+            (Noise::Covariances(given), Self::Sphere { bearings, .. }) => {
+                check_covariances::<3>(bearings.len(), given, |k, given| {
+                    let axes = tangents(&Vector3::from(bearings[k]).normalize());
+                    is_positive(&(axes * given * axes.transpose()))
+                })
+            }
+            (Noise::Unknown, _) => Ok(()),
         }
     }
+}
+
+pub(crate) fn check_lengths(points: usize, flow: usize) -> Result<()> {
+    if points == flow {
+        return Ok(());
+    }
+    Err(Error::argument("flow", format!("{points} values, one for each point"), flow))
+}
+
+/// Whether there is a matrix for every point, each symmetric and `positive`, or not finite: then its point is
+/// left out.
+pub(crate) fn check_covariances<const N: usize>(
+    points: usize,
+    covariances: &[f64],
+    positive: impl Fn(usize, &SMatrix<f64, N, N>) -> bool,
+) -> Result<()> {
+    let values = N * N;
+    if covariances.len() != values * points {
+        let expected = format!("{points} matrices of {values} values");
+        return Err(Error::argument("cov", expected, format!("{} values", covariances.len())));
+    }
+    for (k, values) in covariances.chunks_exact(values).enumerate() {
+        let given = SMatrix::<f64, N, N>::from_row_slice(values);
+        let finite = values.iter().all(|value| value.is_finite());
+        // Asymmetry, in shares of the largest entry, that is rounding.
+        let symmetric = (given - given.transpose()).amax() <= 1e-5 * given.amax();
+        if finite && !(symmetric && positive(k, &given)) {
+            let got = format!("at point {k} {}", numbers(values));
+            return Err(Error::argument("cov", "symmetric positive definite matrices", got));
+        }
+    }
+    Ok(())
+}
+
+pub(crate) fn is_positive<const N: usize>(matrix: &SMatrix<f64, N, N>) -> bool {
+    (matrix + matrix.transpose()).cholesky().is_some()
 }
 
 /// Whether the fourth power of a standard deviation, which sums of squares hold, is a number.
@@ -159,28 +177,6 @@ pub(crate) fn check_field<T>(field: &FlowField<T>) -> Result<()> {
         return Err(Error::argument("field", "flow in px", got));
     }
     Ok(())
-}
-
-/// Asymmetry of a covariance, in shares of its largest entry, that is rounding.
-pub(crate) const ROUNDED: f64 = 1e-5;
-
-pub(crate) fn symmetric(values: &[f64], size: usize) -> bool {
-    let largest = values.iter().fold(0.0f64, |most, value| most.max(value.abs()));
-    let off = |i: usize, j: usize| (values[size * i + j] - values[size * j + i]).abs();
-    (0..size).all(|i| (0..i).all(|j| off(i, j) <= ROUNDED * largest))
-}
-
-/// Whether a matrix is symmetric and positive definite, or not finite: then its point is left out.
-pub(crate) fn is_covariance(matrix: &DMatrix<f64>) -> bool {
-    if !matrix.iter().all(|value| value.is_finite()) {
-        return true;
-    }
-    let even = 0.5 * (matrix + matrix.transpose());
-    symmetric(matrix.as_slice(), matrix.nrows()) && even.cholesky().is_some()
-}
-
-pub(crate) fn not_covariance(k: usize, got: &[f64]) -> Error {
-    Error::argument("cov", "symmetric positive definite matrices", format!("at point {k} {}", numbers(got)))
 }
 
 /// The intrinsics matrix `K` of a pinhole camera: `(px, py, 1) = K (x, y, 1)`, skew and unequal focal lengths

@@ -15,7 +15,7 @@ use crate::math::by_chance;
 use crate::math::random::CounterRng;
 use crate::motion3d::bound::{MotionBound, check_truth, too_few};
 use crate::motion3d::model::input::{
-    Intrinsics, Noise, Placement, Projection, affine_map, is_covariance, not_covariance, to_plane,
+    Intrinsics, Noise, Placement, Projection, affine_map, check_covariances, check_lengths, is_positive, to_plane,
 };
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::options::{Method, MotionOptions};
@@ -26,7 +26,7 @@ use crate::motion3d::solver::covariance::{inverse, plugged};
 use crate::motion3d::solver::finite_rotation::{ROUNDING, ROUNDS};
 use crate::motion3d::solver::refine::Minimum;
 use crate::motion3d::solver::starts::{APART, STARTS, apart, evaluate, sample};
-use nalgebra::{DMatrix, Matrix2, Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix2, Matrix6, Vector3, Vector6};
 use report::{judge, report_motion, turning_report};
 use shrinkage::{covariance_factor, shrunk};
 use std::collections::HashSet;
@@ -57,20 +57,8 @@ const NONLINEAR: f64 = 4.0;
 
 impl AffinePatches<'_> {
     fn check(&self) -> Result<()> {
-        let n = self.points.len();
-        if self.motion.len() != n {
-            return Err(Error::argument("flow", format!("{n} values, one for each point"), self.motion.len()));
-        }
-        if self.covariances.len() != 36 * n {
-            let expected = format!("{n} matrices of 36 values");
-            return Err(Error::argument("cov", expected, format!("{} values", self.covariances.len())));
-        }
-        for (k, given) in self.covariances.chunks_exact(36).enumerate() {
-            if !is_covariance(&DMatrix::from_row_slice(6, 6, given)) {
-                return Err(not_covariance(k, given));
-            }
-        }
-        Ok(())
+        check_lengths(self.points.len(), self.motion.len())?;
+        check_covariances::<6>(self.points.len(), self.covariances, |_, given| is_positive(given))
     }
 
     /// The usable patches, whitened; of displacements, with the rotation `w` taken out of both views.

@@ -174,11 +174,10 @@ impl System {
     /// What one displacement of all flow does to the motion, with these surfaces in the weights.
     pub fn moved(&self, motion: &Motion, surfaces: &[Vector3<f64>]) -> Moved {
         let tangent = tangents(&motion.u());
-        let (mut information, mut sum) = (Matrix5::zeros(), Moved::zeros());
+        let information = self.equations(motion, &tangent, Some(surfaces)).h;
+        let mut sum = Moved::zeros();
         for (patch, surface) in self.patches.iter().zip(surfaces) {
-            let slopes = patch.slopes(&tangent, surface);
-            let weighted = slopes.transpose() * patch.seen(motion).across;
-            information += weighted * slopes;
+            let weighted = patch.slopes(&tangent, surface).transpose() * patch.seen(motion).across;
             sum += weighted * patch.whiten.fixed_columns::<2>(0);
         }
         inverse(&information).map_or(Moved::zeros(), |inverse| inverse * sum)
