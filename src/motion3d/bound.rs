@@ -78,22 +78,13 @@ fn of_known_depths(
     inverse_depth: &[f64],
 ) -> Result<MotionBound> {
     points.check(noise)?;
-    check_truth(noise, motion)?;
-    if inverse_depth.len() != points.len() {
-        let expected = format!("{} values, one for each point", points.len());
-        return Err(Error::argument("inv_depth", expected, inverse_depth.len()));
+    if matches!(noise, Noise::Unknown) {
+        return Err(Error::argument("noise_std", "the noise of the flow, as noise_std or cov", "none"));
     }
+    check_motion(&motion.translation, &motion.rotation)?;
     let observations = Whitening::new(points, noise, Placement::Start).whitened();
-    if observations.n < MIN_POINTS {
-        let finite = (0..points.len()).filter(|&k| points.place(k).iter().all(|value| value.is_finite())).count();
-        return Err(too_few(MIN_POINTS, finite));
-    }
-    let known: Vec<u32> = (0..observations.n as u32)
-        .filter(|&k| inverse_depth[observations.source[k as usize] as usize].is_finite())
-        .collect();
-    if known.len() < MIN_POINTS {
-        return Err(Error::argument("inv_depth", "finite values at five points at least", known.len()));
-    }
+    let places: Vec<[f64; 3]> = (0..points.len()).map(|k| points.place(k).into()).collect();
+    let known = with_known_depth(&observations.source, (&places, inverse_depth), |nu| nu.is_finite(), MIN_POINTS)?;
     let observations = observations.subset(&known);
     let mut nu: Vec<f64> = observations.source.iter().map(|&k| inverse_depth[k as usize]).collect();
     nu.resize(observations.stride, 0.0);
@@ -103,21 +94,33 @@ fn of_known_depths(
     MotionBound::of(&tangent, &m, &noise, |bound| weighted_noise(&observations, motion, &tangent, &nu, bound))
 }
 
-/// What to say where fewer than `least` points are usable, of which so many have a finite place: the others
-/// lack a finite covariance.
-pub(crate) fn too_few(least: usize, finite: usize) -> Error {
-    if finite < least {
-        Error::argument("points", format!("at least {least} points that are finite"), finite)
-    } else {
-        Error::argument("cov", format!("finite covariances of at least {least} points"), "fewer")
+/// Which of the usable points, that come from `source` among all `places`, have a known depth: `least` of
+/// them.
+pub(crate) fn with_known_depth<const N: usize, D>(
+    source: &[u32],
+    (places, depths): (&[[f64; N]], &[D]),
+    is_known: impl Fn(&D) -> bool,
+    least: usize,
+) -> Result<Vec<u32>> {
+    if depths.len() != places.len() {
+        let expected = format!("{} values, one for each point", places.len());
+        return Err(Error::argument("inv_depth", expected, depths.len()));
     }
-}
-
-pub(crate) fn check_truth(noise: &Noise<'_>, motion: &Motion) -> Result<()> {
-    if matches!(noise, Noise::Unknown) {
-        return Err(Error::argument("noise_std", "the noise of the flow, as noise_std or cov", "none"));
+    if source.len() < least {
+        let finite = places.iter().filter(|at| at.iter().all(|value| value.is_finite())).count();
+        // The others lack a finite covariance.
+        return Err(if finite < least {
+            Error::argument("points", format!("at least {least} points that are finite"), finite)
+        } else {
+            Error::argument("cov", format!("finite covariances of at least {least} points"), "fewer")
+        });
     }
-    check_motion(&motion.translation, &motion.rotation)
+    let known: Vec<u32> =
+        (0..source.len() as u32).filter(|&k| is_known(&depths[source[k as usize] as usize])).collect();
+    if known.len() < least {
+        return Err(Error::argument("inv_depth", format!("finite values of at least {least} points"), known.len()));
+    }
+    Ok(known)
 }
 
 /// Whether a motion is finite and has a direction.

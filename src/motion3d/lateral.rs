@@ -1,17 +1,12 @@
 //! A translation along the image plane without a rotation: section 5 of the paper, where one angle is unknown
 //! and everything has a closed form.
 //!
-//! On the plane at distance 1 with `u_z = 0`, `w = 0` and `u = (cos psi, sin psi, 0)` the flow is `f_k = nu_k
-//! u` with noise. Any weights `mean + a (m_k - mean)` of the parts `m_k = f_k . u` along the direction make
-//! the estimating equation `sum weight_k (f_k across u) = 0` the principal axis of
-//!
-//! ```text
-//! Q = F F^t / n + a (sum f f^t - F F^t / n),     F = sum f
-//! ```
-//!
-//! with `a = 1` for maximum likelihood (28), `a = 0` for weights of 1 (30) and `a = tau^2 / (tau^2 +
-//! sigma^2)`, `tau^2` the scatter of the depths, for shrunk ones. The variance is `sigma^2 (mean^2 + a^2
-//! (tau^2 + sigma^2)) / (n (mean^2 + a tau^2)^2)`, which is (29), (31) and the least of all `a`.
+//! With `u = (cos psi, sin psi, 0)` the flow is `f_k = nu_k u` with noise. Any weights `mean + a (m_k -
+//! mean)` of the parts `m_k = f_k . u` along the direction make the estimating equation `sum weight_k (f_k
+//! across u) = 0` the principal axis of `F F^t / n + a (sum f f^t - F F^t / n)`, `F = sum f`: `a = 1` for
+//! maximum likelihood (28), 0 for weights of 1 (30), `tau^2 / (tau^2 + sigma^2)` with the scatter `tau^2` of
+//! the depths for shrunk ones. The variance is `sigma^2 (mean^2 + a^2 (tau^2 + sigma^2)) / (n (mean^2 + a
+//! tau^2)^2)`.
 
 use super::model::input::check_noise_std;
 use crate::error::{Error, Result};

@@ -1,34 +1,16 @@
 //! The rows of `f = nu G u + R w` at one point, of its affine form, and of displacements over a frame.
 //!
-//! # Displacements over a whole frame
-//!
-//! With the rotation taken out what is left is exact.
-//!
-//! A steady motion `X_dot = u + w x X` takes `X_1` to `X_2 = exp([w]x) X_1 + V u` in one frame. Rotated to
-//! the camera's orientation half way, `X_1' = exp([w]x / 2) X_1` and `X_2' = exp(-[w]x / 2) X_2`, only a
-//! translation is left:
+//! A steady motion takes `X_1` to `X_2` in one frame. Rotated to the camera's orientation half way, `X_1' =
+//! exp([w]x / 2) X_1` and `X_2' = exp(-[w]x / 2) X_2`, only a translation is left:
 //!
 //! ```text
-//! X_2' = X_1' + t,    t = V' u,    V' = int exp(s [w]x) ds from -1/2 to 1/2
-//! V' = I + (1 - sin(a / 2) / (a / 2)) / a^2 [w]x^2,    a = |w|
-//! ```
-//!
-//! `V'` is symmetric and has no part of first order in `w`. The picture's points of both ends, `eta_1'` and
-//! `eta_2'`, lie on a line through the epipole, and with `nu = 1 / Z_2'`
-//!
-//! ```text
-//! eta_2' - eta_1' = nu G(eta_1') t        exactly, however long the displacement
+//! X_2' = X_1' + t,    t = V' u,    V' = I + (1 - sin(a / 2) / (a / 2)) / a^2 [w]x^2,    a = |w|
+//! eta_2' - eta_1' = nu G(eta_1') t,    nu = 1 / Z_2',    exactly, however long the displacement
 //! ```
 //!
 //! A rotation that is `d` more than the one that was taken out adds `R V' d` across the line to first order,
-//! with `R = (1 - nu t_z / 2) R(m)` and the middle `m` of both ends, as `exp([w + d]x) = exp([w]x / 2)
-//! exp([V' d]x) exp([w]x / 2)`. So the rows `G(eta_1') V'`, `R V'` with the flow `eta_2' - eta_1' + R V' w`
-//! (and `V' w = w`) have the same unknowns `(u, w)` as those of instantaneous flow, and are exact where the
-//! rotation taken out is the motion's own.
-//!
-//! At the middle the same holds, with `nu = 2 / (Z_1' + Z_2')`; but there the noise of the second view's
-//! point is in `m`, too, and the residual across the line is its distance from the epipolar line times `2
-//! Z_2' / (Z_1' + Z_2')`: a motion that takes all depths far away would make any flow fit.
+//! with `R = (1 - nu t_z / 2) R(m)` and the middle `m` of both ends. So the rows `G(eta_1') V'`, `R V'` with
+//! the flow `eta_2' - eta_1' + R V' w` (and `V' w = w`) have the unknowns `(u, w)` of instantaneous flow.
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Rotation3, SMatrix, Vector2, Vector3};
 

@@ -13,9 +13,9 @@ mod system;
 use crate::error::{Error, Result};
 use crate::math::by_chance;
 use crate::math::random::CounterRng;
-use crate::motion3d::bound::{MotionBound, check_truth, too_few};
+use crate::motion3d::bound::{MotionBound, check_motion, with_known_depth};
 use crate::motion3d::model::input::{
-    Intrinsics, Noise, Placement, Projection, affine_map, check_covariances, check_lengths, is_positive, to_plane,
+    Intrinsics, Placement, Projection, affine_map, check_covariances, check_lengths, is_positive, to_plane,
 };
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::options::{Method, MotionOptions};
@@ -192,7 +192,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     let place = |&k: &u32| patches.points[k as usize].map(f64::to_bits);
     let places = system.source.iter().map(place).collect::<HashSet<_>>().len();
     let minima: Vec<Motion> = minima.iter().map(|minimum| minimum.motion).collect();
-    judge(&mut out, system, &minima, places, low, rng.stream(1));
+    judge(&mut out, system, &minima, places, low);
     out
 }
 
@@ -231,29 +231,16 @@ fn settle(patches: &AffinePatches<'_>, placement: Placement, system: &mut System
 }
 
 /// As [`motion_bound`](crate::motion3d::motion_bound), for six numbers a patch whose true `(nu, nu_x, nu_y)`
-/// are given;
-/// their flow is not looked at.
+/// are given; their flow is not looked at.
 ///
 /// # Errors
 /// As [`motion_bound`](crate::motion3d::motion_bound).
 pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces: &[[f64; 3]]) -> Result<MotionBound> {
     patches.check()?;
-    check_truth(&Noise::StandardDeviation(1.0), motion)?;
-    if surfaces.len() != patches.points.len() {
-        let expected = format!("{} surfaces, one for each point", patches.points.len());
-        return Err(Error::argument("inv_depth", expected, surfaces.len()));
-    }
+    check_motion(&motion.translation, &motion.rotation)?;
     let system = patches.system(Placement::Start, &Vector3::zeros());
-    if system.patches.len() < MIN_PATCHES {
-        let finite = |at: &&[f64; 2]| at.iter().all(|value| value.is_finite());
-        return Err(too_few(MIN_PATCHES, patches.points.iter().filter(finite).count()));
-    }
-    let known: Vec<u32> = (0..system.patches.len() as u32)
-        .filter(|&k| surfaces[system.source[k as usize] as usize].iter().all(|value| value.is_finite()))
-        .collect();
-    if known.len() < MIN_PATCHES {
-        return Err(Error::argument("inv_depth", "finite surfaces of two patches at least", known.len()));
-    }
+    let finite = |surface: &[f64; 3]| surface.iter().all(|value| value.is_finite());
+    let known = with_known_depth(&system.source, (patches.points, surfaces), finite, MIN_PATCHES)?;
     let system = system.subset(&known);
     let surfaces: Vec<Vector3<f64>> = system.source.iter().map(|&k| surfaces[k as usize].into()).collect();
     let tangent = tangents(&motion.u());

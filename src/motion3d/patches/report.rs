@@ -1,20 +1,16 @@
 //! Assembles the result for patches, and finds what else could be true.
 
+use super::FEW;
 use super::system::System;
-use super::{FEW, SEARCHED};
-use crate::math::random::CounterRng;
-use crate::motion3d::diagnostics::confidence_region::PLAUSIBLE;
 use crate::motion3d::diagnostics::contact::Rates;
 use crate::motion3d::diagnostics::report::{report_rotation, set_motion};
 use crate::motion3d::diagnostics::rotation_only::RotationOnly;
-use crate::motion3d::diagnostics::status::{FAR, SPACING, SURE, WIDE};
+use crate::motion3d::diagnostics::status::{SURE, WIDE};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::model::result::{Alternative, MotionEstimate, Status};
 use crate::motion3d::model::rows::{Matrix5, tangents};
-use crate::motion3d::solver::covariance::direction_deviation;
 use crate::motion3d::solver::likelihood::DISTINCT;
-use crate::motion3d::solver::starts::{evaluate, sample};
 use nalgebra::{Matrix2, Vector3};
 
 /// Motions nearer than so many degrees are one.
@@ -75,27 +71,15 @@ pub(crate) fn turning_report(
 ///
 /// `minima`: all that were found, maximum likelihood's first; `places`: where patches lie; `low`: whether
 /// their surfaces are mostly noise.
-pub(crate) fn judge(
-    out: &mut MotionEstimate,
-    system: &System,
-    minima: &[Motion],
-    places: usize,
-    low: bool,
-    rng: CounterRng,
-) {
+pub(crate) fn judge(out: &mut MotionEstimate, system: &System, minima: &[Motion], places: usize, low: bool) {
     let own = out.direction_std;
-    let likelihood = direction_deviation(&Matrix5::from_fn(|i, j| out.likelihood.covariance[i][j]));
     out.alternatives = others(system, &out.motion, minima, if own.is_finite() { own } else { 0.0 });
-    // Not a number where it is not known.
-    let deviation = own.max(likelihood);
     out.status = if places < FEW {
         Status::FewPoints
     } else if own.is_nan() || own > WIDE {
         Status::IllConditioned
     } else if !out.alternatives.is_empty() {
         Status::Ambiguous
-    } else if far(system, &[out.motion, minima[0]], deviation, rng) {
-        Status::IllConditioned
     } else if low {
         Status::LowSnr
     } else {
@@ -121,24 +105,4 @@ fn others(system: &System, motion: &Motion, minima: &[Motion], deviation: f64) -
     }
     found.sort_by(|a, b| a.excess.total_cmp(&b.excess));
     found
-}
-
-/// Whether directions explain the patches as well as the estimate that are farther than the covariance has
-/// it.
-fn far(system: &System, motions: &[Motion], deviation: f64, rng: CounterRng) -> bool {
-    let n = system.patches.len();
-    let few = system.subset(&sample(n, SEARCHED, rng));
-    let fewer = (n as f64 / few.patches.len() as f64).sqrt();
-    let cost = |u: &Vector3<f64>, limit: f64| {
-        let (w, cost) = few.best_rotation(u).filter(|(_, cost)| *cost < limit)?;
-        let behind = |u: &Vector3<f64>| few.equations(&Motion::of(u, &w), &tangents(u), None).behind;
-        Some(cost + behind(u).min(behind(&-u)))
-    };
-    let Some(least) = motions.iter().filter_map(|m| cost(&m.u(), f64::INFINITY)).reduce(f64::min) else { return true };
-    let (limit, first) = (least + PLAUSIBLE, motions[0].u());
-    let angles = evaluate(|u| {
-        let plausible = cost(u, limit).is_some_and(|cost| cost < limit);
-        plausible.then(|| first.cross(u).norm().atan2(first.dot(u).abs()).to_degrees())
-    });
-    angles.into_iter().fold(0.0, f64::max) > FAR * deviation * fewer + SPACING
 }
