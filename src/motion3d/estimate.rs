@@ -1,19 +1,32 @@
-//! Entry point: estimates rigid motion from optical flow.
+//! Entry point: estimates rigid motion from optical flow. Searches the inliers where it must, fits the motion
+//! to them and assembles the result.
 
-use super::diagnostics::report::{doubted, rotation_report, with_all_inliers};
+use super::diagnostics::report::{doubted, of_estimated_noise, report, rotation_report, with_all_inliers};
 use super::diagnostics::rotation_only::{
     explained_by_rotation, explained_by_rotation_in_unknown_noise, without_likeliest_rotation,
 };
-use super::fit::Task;
+use super::diagnostics::rotation_prior::of_flow_alone;
+use super::diagnostics::solution::Solution;
+use super::diagnostics::status::judge;
 use super::model::input::{Flow, Noise};
-use super::model::observations::Scaled;
-use super::model::options::{MotionOptions, RotationPrior};
-use super::model::result::{MotionEstimate, Status};
+use super::model::motion::Motion;
+use super::model::observations::{Observations, Scaled};
+use super::model::options::{Method, MotionOptions, RotationPrior};
+use super::model::result::{Alternative, MotionEstimate, Status};
 use super::model::whitening::Whitening;
 use super::robust;
-use super::robust::Consensus;
+use super::robust::{CompetingMotion, Consensus, larger};
+use super::solver::covariance::plugged;
+use super::solver::efficient::{beyond_theory, covariance_at};
+use super::solver::finite_rotation::{settle, shift};
+use super::solver::likelihood::{Candidate, choose, different, minima, near_best, smoothed};
+use super::solver::profile_likelihood::ProfileLikelihood;
+use super::solver::refine::{Minimum, StoppingCriteria, refine};
+use super::solver::smoothing::DepthSmoother;
 use crate::error::Result;
+use crate::math::by_chance;
 use crate::math::random::CounterRng;
+use rayon::prelude::*;
 
 /// Least number of points for a motion.
 pub(crate) const MIN_POINTS: usize = 5;
@@ -72,9 +85,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     let still = match (options.robust, scaled.unknown) {
         // Nothing is left that noise could be estimated from, but for rounding.
         (true, true) => explained_by_rotation_in_unknown_noise(&scaled.observations, 0.0).map(|rotation| {
-            let before = scaled.noise_std;
-            scaled.take((rotation.chi2 / (2 * scaled.observations.n - 3) as f64).sqrt());
-            rotation.in_units(before / scaled.noise_std)
+            rotation.in_units(scaled.take((rotation.chi2 / (2 * scaled.observations.n - 3) as f64).sqrt()))
         }),
         (false, false) => explained_by_rotation(&scaled.observations),
         _ => None,
@@ -105,4 +116,178 @@ fn consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) ->
         competitor.excess *= own * own;
     }
     found
+}
+
+/// Number of points from which on [`Method::Auto`] smooths depths.
+const SMOOTHED: usize = 30;
+
+/// Squared shift, in standard deviations, by which a motion differs from that whose rotation is taken out.
+const MAX_SHIFT: f64 = 1.0;
+
+/// The inliers of one motion with the options of the fit.
+struct Task<'a, 'b> {
+    whitening: &'a Whitening<'b>,
+    options: &'a MotionOptions,
+    /// What a robust search found.
+    known: Option<&'a Consensus>,
+    rng: CounterRng,
+}
+
+impl Task<'_, '_> {
+    /// Estimates on the `inliers` of all points.
+    fn on(&self, scaled: &mut Scaled, mut inliers: Observations) -> MotionEstimate {
+        let flow = self.whitening.flow;
+        let mut found = self.begin(&inliers);
+        if !found.is_empty() {
+            settle(self.whitening, &mut inliers, &mut found);
+        }
+        if found.is_empty() {
+            return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.noise_std);
+        }
+        let cost = found[0].equations.cost - inliers.pulled(&found[0].motion.w());
+        if let Some(turn) = inliers.turn {
+            scaled.observations = self.whitening.derotated(&scaled.observations, turn);
+        }
+        if let Some(estimate) = self.without_translation(scaled, &mut inliers, cost) {
+            return estimate;
+        }
+        if scaled.unknown {
+            inliers.rescale(scaled.take((cost / inliers.n.saturating_sub(5).max(1) as f64).sqrt()));
+            found =
+                found.iter().map(|minimum| refine(&inliers, minimum.motion, StoppingCriteria::of(inliers.n))).collect();
+        }
+        let (candidates, made) = self.chosen(&inliers, &found);
+        let mut solution = self.solved(&inliers, &candidates, made);
+        // Undetermined: the points were derotated about a different rotation.
+        solution.described &= shift(self.whitening, &inliers, &solution.motion) <= MAX_SHIFT;
+        self.inflate(&mut solution, scaled, &inliers, candidates[0].minimum.equations.cost);
+        if solution.contradicted(&inliers) {
+            solution.without_prior = Some(of_flow_alone(&inliers, &solution.motion));
+        }
+        solution.alternatives = near_best(&candidates, inliers.n)[1..]
+            .iter()
+            .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
+            .collect();
+        let competing: &[CompetingMotion] = self.known.map_or(&[], |known| &known.competing);
+        judge(self.whitening, &inliers, &mut solution, scaled.unknown, competing, self.rng.stream(4));
+        report(flow, &scaled.observations, &inliers, &solution, scaled.noise_std)
+    }
+
+    /// The minima of the likelihood.
+    fn begin(&self, inliers: &Observations) -> Vec<Minimum> {
+        match (&self.options.initial, self.known) {
+            (Some(initial), _) => vec![refine(inliers, initial.normalized(), StoppingCriteria::FULL)],
+            (None, None) => minima(inliers, self.rng.stream(2)),
+            (None, Some(known)) => again(inliers, known),
+        }
+    }
+
+    /// The report where chance explains what a rotation alone leaves; `cost` is what the best motion leaves
+    /// of the flow. (Of all points in known noise this was tested before any motion was searched.)
+    fn without_translation(
+        &self,
+        scaled: &mut Scaled,
+        inliers: &mut Observations,
+        cost: f64,
+    ) -> Option<MotionEstimate> {
+        let rotation = match (scaled.may_turn, scaled.unknown) {
+            (true, true) => {
+                let rotation = explained_by_rotation_in_unknown_noise(inliers, cost)?;
+                let left = rotation.chi2 - inliers.pulled(&rotation.rotation);
+                let factor = scaled.take((left / (2 * inliers.n - 3) as f64).sqrt());
+                inliers.rescale(factor);
+                rotation.in_units(factor)
+            }
+            (true, false) if self.options.robust => explained_by_rotation(inliers)?,
+            _ => return None,
+        };
+        let (flow, all) = (self.whitening.flow, &scaled.observations);
+        Some(rotation_report(flow, all, inliers, &rotation, scaled.noise_std, self.options))
+    }
+
+    /// The minima in the order of preference.
+    fn chosen(&self, inliers: &Observations, found: &[Minimum]) -> (Vec<Candidate>, Option<DepthSmoother>) {
+        if self.options.initial.is_some() {
+            let given = |minimum: &Minimum| Candidate { cost: minimum.equations.cost, minimum: *minimum };
+            return (found.iter().map(given).collect(), None);
+        }
+        choose(inliers, found, || self.smoother(inliers))
+    }
+
+    fn smoother(&self, inliers: &Observations) -> DepthSmoother {
+        DepthSmoother::new(inliers, self.options.smoother, self.rng.stream(3))
+    }
+
+    /// Maximum likelihood's motion or that of the smoothed weights, which are also solved where maximum
+    /// likelihood's theory does not hold.
+    fn solved(&self, inliers: &Observations, candidates: &[Candidate], made: Option<DepthSmoother>) -> Solution {
+        let chosen = &candidates[0];
+        let wanted = match self.options.method {
+            Method::Auto => inliers.n >= SMOOTHED,
+            Method::Efficient => true,
+            Method::MaximumLikelihood => false,
+        };
+        let plugged = plugged(&chosen.minimum.equations.h, &chosen.minimum.equations.p);
+        let Minimum { motion, tangent, .. } = &chosen.minimum;
+        let profile = ProfileLikelihood { observations: inliers, motion, tangent };
+        let bent = plugged.as_ref().is_some_and(|plugged| profile.bent(&plugged.likelihood) > 0);
+        let linear = plugged.as_ref().is_some_and(|plugged| !bent && !beyond_theory(inliers, &chosen.minimum, plugged));
+        let mut improved = None;
+        if wanted || !linear {
+            improved = smoothed(inliers, self.options, motion, &mut made.unwrap_or_else(|| self.smoother(inliers)));
+        }
+        // Maximum likelihood alone is undetermined beyond its theory; a minimum from where smoothed weights
+        // lead nowhere is spurious.
+        let mut described = !bent && !wanted;
+        if let Some(best) = &mut improved {
+            (best.covariance, described) = best.lengthened(inliers, || self.smoother(inliers));
+        }
+        let undescribed = plugged.is_none() && improved.is_none();
+        let mut solution = Solution::new(chosen, plugged.as_ref(), improved, wanted);
+        solution.described = described;
+        if undescribed {
+            solution.covariance = covariance_at(inliers, &solution.motion, &mut self.smoother(inliers));
+        }
+        solution
+    }
+
+    /// Takes into account what a linear theory of independent inliers of known noise leaves out. `cost`: what
+    /// maximum likelihood leaves.
+    fn inflate(&self, solution: &mut Solution, scaled: &Scaled, inliers: &Observations, cost: f64) {
+        if let Some(known) = self.known {
+            solution.weighted_by_posterior(&scaled.observations, known, self.options.weight_depths.is_some());
+        }
+        let common = solution.systematic_effect(inliers, self.whitening.flow, &self.options.systematic_errors());
+        let length = self.options.correlation_length.filter(|length| *length > 0.0);
+        solution.add_correlation(inliers, self.whitening.flow, length);
+        let wider = match (scaled.unknown, self.known) {
+            (true, known) => of_estimated_noise(inliers.n, known.is_some()),
+            // The residuals determine how large correlated errors are.
+            (false, _) if length.is_some() => 1.0,
+            (false, None) => misfit(inliers, cost),
+            // What outliers leave among truncated residuals is accounted for.
+            (false, Some(_)) => larger(&scaled.observations, &solution.motion),
+        };
+        solution.inflate(wider, common);
+    }
+}
+
+/// What residuals are larger by, in variance, than the given noise, where chance does not explain it: what
+/// the model leaves out (larger noise than given, outliers, a minimum that was missed), the motion is off by
+/// as much (R. Birge 1932).
+fn misfit(inliers: &Observations, cost: f64) -> f64 {
+    let free = inliers.n.saturating_sub(5) as f64 / inliers.points_per_independent_sample;
+    if free > 0.0 && !by_chance(cost, free) { cost / free } else { 1.0 }
+}
+
+/// The minimum that a robust search led to, and those that other minima for the same points lead to.
+///
+/// Among many outliers that motion is already the likeliest.
+fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
+    if known.many {
+        return vec![refine(inliers, known.motion, StoppingCriteria::NONE)];
+    }
+    let others = known.competing.iter().filter(|competitor| !competitor.others).map(|competitor| competitor.motion);
+    let motions: Vec<Motion> = std::iter::once(known.motion).chain(others).collect();
+    different(motions.into_par_iter().map(|motion| refine(inliers, motion, StoppingCriteria::of(inliers.n))).collect())
 }

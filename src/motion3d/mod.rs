@@ -20,10 +20,10 @@
 //! `u` and `w` are the motion of the scene relative to the camera: `X_dot = u + w x X`; the camera's own
 //! velocity is `-u`. Camera axes: x right, y down, z forward. Inverse depths are in units of `|u|` per frame.
 //!
-//! The data pass `model` (rows of unit noise), `robust` (outliers; it searches with `solver` and `kernels`),
-//! `fit` (minima and weights, by `solver`) and `diagnostics` (covariance, status, report); `estimate` is the
-//! entry point. `patches` does the same for affine flow, `field` takes points or windows of flow fields,
-//! `bound` predicts covariances, `lateral` is the closed form without rotation.
+//! The entry point `estimate` leads the data through `model` (rows of unit noise), `robust` (outliers),
+//! `solver` (minima and weights; both sum over points with `kernels`) and `diagnostics` (covariance, status,
+//! report). `patches` does the same for affine flow, `field` takes points or windows of flow fields, `bound`
+//! predicts covariances, `lateral` is the closed form without rotation.
 //!
 //! ```
 //! use jacoflow::motion3d::{Flow, Method, Motion, MotionOptions, Noise, Placement, Status, estimate_motion};
@@ -47,7 +47,6 @@ mod bound;
 mod diagnostics;
 mod estimate;
 mod field;
-mod fit;
 mod kernels;
 mod lateral;
 mod model;

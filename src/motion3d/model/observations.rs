@@ -292,13 +292,16 @@ pub(crate) struct Scaled {
 }
 
 impl Scaled {
-    /// Takes `noise_std` in units of the present noise to be the noise.
-    pub fn take(&mut self, noise_std: f64) {
+    /// Takes `noise_std` in units of the present noise to be the noise; returns what the points are
+    /// multiplied with.
+    pub fn take(&mut self, noise_std: f64) -> f64 {
         // Flow that is exactly zero has some noise, too.
         let noise_std = noise_std.max(ROUNDING * self.observations.median_flow()).max(1e-100);
-        if noise_std.is_finite() {
-            self.observations.rescale(1.0 / noise_std);
-            self.noise_std *= noise_std;
+        if !noise_std.is_finite() {
+            return 1.0;
         }
+        self.observations.rescale(1.0 / noise_std);
+        self.noise_std *= noise_std;
+        1.0 / noise_std
     }
 }
