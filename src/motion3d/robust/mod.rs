@@ -1,32 +1,30 @@
 //! Inliers of one motion among outliers, in this order.
 //!
-//! * `search`: every direction with the best of many rotations; `graduated_weights` refines the best ones to
-//!   motions with many inliers. `noise_scale` estimates unknown noise from these inliers.
+//! * `search`: every direction with the best of many rotations, refined to motions with many inliers. `noise`
+//!   estimates unknown noise from these inliers, and whether few points have outliers at all.
 //! * `competing_motions`: other motions with about as many inliers, and the choice among many outliers.
-//! * `depth_consistency`: inliers whose depth is that of their neighbours (`cells`); `outlier_posterior`: the
+//! * `depth_consistency`: inliers whose depth is that of their neighbours; `outlier_posterior`: the
 //!   probability that an inlier is an outlier.
-//! * `moving_objects`: inliers with many rejected neighbours are left out.
-//! * `hidden_object`, `residual_structure`: whether it is two motions. The latter tests parts of the picture
-//!   (`regional_score`) and fits two motions to them (`two_motion_fit`).
+//! * `regions`: inliers with many rejected neighbours, those of moving objects, are left out.
+//! * `hidden_object`, `two_motions`: whether it is two motions.
 //!
-//! `single_noise` tests whether few points have outliers at all. `diagnostics` calls `mixture`, which weighs
-//! points by that probability, and `leverage`, which tests whether few points decide.
+//! `diagnostics` calls `mixture`, which weighs points by that probability, and `leverage`, which tests
+//! whether few points decide.
 
-mod cells;
 mod competing_motions;
 mod depth_consistency;
-mod graduated_weights;
+
 mod hidden_object;
 mod leverage;
 mod mixture;
-mod moving_objects;
-mod noise_scale;
+mod noise;
+
 mod outlier_posterior;
-mod regional_score;
-mod residual_structure;
+mod regions;
+
 mod search;
-mod single_noise;
-mod two_motion_fit;
+
+mod two_motions;
 
 use crate::ablation::keeps;
 use crate::math::random::CounterRng;
@@ -37,15 +35,15 @@ use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::finite_rotation::changes_inliers;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use crate::motion3d::solver::starts::at_most;
-use cells::Cells;
 use competing_motions::{among_many_outliers, competing_motions, second};
 use depth_consistency::DepthConsistency;
-use graduated_weights::{GraduatedWeights, graduated};
 pub(crate) use leverage::has_high_leverage;
 pub(crate) use mixture::{EstimatedMotion, weighted_by_posterior};
-pub(crate) use noise_scale::larger;
+pub(crate) use noise::larger;
+pub(crate) use noise::one_noise;
 use outlier_posterior::OutlierPosterior;
-pub(crate) use single_noise::one_noise;
+use regions::Cells;
+use search::{GraduatedWeights, graduated};
 use std::borrow::Cow;
 
 /// Residual, in units of noise, from which on a point is an outlier; depths behind the camera may be as
@@ -169,12 +167,12 @@ fn with_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -
         return in_noise(whitening, scaled, false, rng);
     }
     let few = keeps("motion3d.single_noise") && scaled.observations.n < SELECTED;
-    let single_noise = few.then(|| single_noise::noise_std(whitening, &scaled.observations, rng)).flatten();
+    let single_noise = few.then(|| noise::noise_std(whitening, &scaled.observations, rng)).flatten();
     let single_noise = single_noise.map(|noise_std| noise_std * scaled.noise_std);
-    scaled.take(noise_scale::FIRST_SHARE * scaled.observations.median_flow());
+    scaled.take(noise::FIRST_SHARE * scaled.observations.median_flow());
     let found = in_noise(whitening, scaled, true, rng)?;
     let Some(noise_std) = single_noise.map(|noise_std| noise_std / scaled.noise_std) else { return Some(found) };
-    let shorter = single_noise::shortening(&scaled.observations, &found, noise_std);
+    let shorter = noise::shortening(&scaled.observations, &found, noise_std);
     // If both noises are nearly equal, the choice does no harm.
     let (n, k) = (scaled.observations.n, found.inliers.len());
     let doubtful = k < n && noise_std > APART_NOISE && (shorter < SURE || k < FEWEST);
@@ -197,7 +195,7 @@ fn in_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, unknown: bool, rng: 
             if few { of_candidates(&scaled.observations, candidates.clone(), rng)?.motion } else { candidates[0].0 };
         let mut changed = false;
         if unknown {
-            let noise_std = noise_scale::noise(&depths(&scaled.observations, &best).e[..scaled.observations.n]);
+            let noise_std = noise::noise(&depths(&scaled.observations, &best).e[..scaled.observations.n]);
             changed = (noise_std - 1.0).abs() > SETTLED_NOISE;
             scaled.take(noise_std);
         }
@@ -259,7 +257,7 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
     }
     found.inner.clone_from(&found.inliers);
     if keeps("motion3d.moving_objects")
-        && let Some(inner) = moving_objects::inner(observations, &found, &cells)
+        && let Some(inner) = regions::inner(observations, &found, &cells)
     {
         found.inner = inner.inliers;
         found.has_inlier_neighbours = Some(inner.has_inlier_neighbours);
@@ -291,7 +289,7 @@ fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRn
         on.to_mut().rescale(variance.sqrt().recip());
     }
     let shown = if inner && variance <= 1.0 { found.inner.clone() } else { inliers_of(&on, &found.motion) };
-    let instead = residual_structure::competing_motion(&on, &found.motion, &shown, rng);
+    let instead = two_motions::competing_motion(&on, &found.motion, &shown, rng);
     let instead = instead.map(|other| CompetingMotion { excess: other.excess * variance, ..other });
     found.competing.extend(instead);
     found
