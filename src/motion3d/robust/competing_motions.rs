@@ -1,7 +1,7 @@
 //! Motions apart from the one with the most inliers, and the choice among several with many outliers.
 
+use super::cells::Cells;
 use super::depth_consistency::DepthConsistency;
-use super::regions::Cells;
 use super::search::{GraduatedWeights, graduated};
 use super::{APART, CompetingMotion, FEWEST, INLIER, MAJORITY, cheaper_sign, inliers_of, mixture};
 use crate::math::random::CounterRng;

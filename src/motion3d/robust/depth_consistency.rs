@@ -5,8 +5,8 @@
 //! motion with such a depth as miss its epipolar line by a little more and have the same depth. Points with
 //! such depths are outliers if that many explain them (the local false discovery rate; B. Efron 2001).
 
+use super::cells::Cells;
 use super::outlier_posterior::{BAND, Bin, DOUBLING, OutlierPosterior};
-use super::regions::Cells;
 use super::{Consensus, INLIER};
 use crate::math::{median, quantile};
 use crate::motion3d::kernels::{Depths, depths};

@@ -4,7 +4,7 @@
 //! the noise. No residual shows that. But the motion of the scene is then another one, which fits all points
 //! except those of one region, and its depth map is as smooth and as far in front of the camera.
 
-use super::regions::{Cells, Neighbourhoods};
+use super::cells::{Cells, Neighbourhoods};
 use super::search::GraduatedWeights;
 use super::{APART, Candidates, CompetingMotion, INLIER, STOPPING, cheaper_sign, inliers_of, truncated};
 use crate::math::random::CounterRng;

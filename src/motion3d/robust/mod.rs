@@ -5,7 +5,7 @@
 //! * `competing_motions`: other motions with about as many inliers, and the choice among many outliers.
 //! * `depth_consistency`: inliers whose depth is that of their neighbours; `outlier_posterior`: the
 //!   probability that an inlier is an outlier.
-//! * `regions`: inliers with many rejected neighbours, those of moving objects, are left out.
+//! * `cells`: inliers with many rejected neighbours, those of moving objects, are left out.
 //! * `hidden_object`, `two_motions`: whether it is two motions.
 //!
 //! `diagnostics` calls `mixture`, which weighs points by that probability, and `leverage`, which tests
@@ -19,8 +19,8 @@ mod leverage;
 mod mixture;
 mod noise;
 
+mod cells;
 mod outlier_posterior;
-mod regions;
 
 mod search;
 
@@ -35,6 +35,7 @@ use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::finite_rotation::changes_inliers;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use crate::motion3d::solver::starts::at_most;
+use cells::Cells;
 use competing_motions::{among_many_outliers, competing_motions, second};
 use depth_consistency::DepthConsistency;
 pub(crate) use leverage::has_high_leverage;
@@ -42,7 +43,6 @@ pub(crate) use mixture::{EstimatedMotion, weighted_by_posterior};
 pub(crate) use noise::larger;
 pub(crate) use noise::one_noise;
 use outlier_posterior::OutlierPosterior;
-use regions::Cells;
 use search::{GraduatedWeights, graduated};
 use std::borrow::Cow;
 
@@ -257,7 +257,7 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
     }
     found.inner.clone_from(&found.inliers);
     if keeps("motion3d.moving_objects")
-        && let Some(inner) = regions::inner(observations, &found, &cells)
+        && let Some(inner) = cells::inner(observations, &found, &cells)
     {
         found.inner = inner.inliers;
         found.has_inlier_neighbours = Some(inner.has_inlier_neighbours);

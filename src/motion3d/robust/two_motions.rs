@@ -81,8 +81,8 @@ fn residual_structure(observations: &Observations, motion: &Motion, points: &[u3
 const PART: usize = 16;
 const MIN_PART: usize = 8;
 
-/// Standard deviations by which one of about thirty parts differs in one of five pictures by chance: the fit of
-/// two motions decides then.
+/// Standard deviations by which one of about thirty parts differs in one of five pictures by chance: the fit
+/// of two motions decides then.
 const FAR: f64 = 2.5;
 
 /// Information about a combination of the unknowns that a part has of its own, as a share of all; less is

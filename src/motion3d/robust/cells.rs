@@ -1,5 +1,5 @@
-//! Neighbourhoods: about sixteen cells of points that lie together; and rejection of moving objects, which are
-//! connected: their points that fit the scene's motion by chance pull it towards theirs.
+//! Neighbourhoods: about sixteen cells of points that lie together; and rejection of moving objects, which
+//! are connected: their points that fit the scene's motion by chance pull it towards theirs.
 
 use super::{Consensus, MIN_POINTS, STOPPING, inliers_of};
 use crate::math::median;
