@@ -27,7 +27,6 @@ mod particle_track;
 mod points;
 mod progress;
 #[cfg(feature = "reference")]
-#[path = "../../benchmarks/rivals/gradient_reference/binding.rs"]
 mod reference_track;
 mod scenes;
 mod segment;

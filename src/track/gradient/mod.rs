@@ -3,8 +3,7 @@
 //! Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method"
 //! (IPSJ). Their idea is kept (the gradient equation, a prediction in place of iterations, a stopped
 //! background, a Gauss-Markov filter), but the equation is solved once for the pose of the whole segmented
-//! target. Their own loop is in `benchmarks/rivals/gradient_reference`, compiled with the feature
-//! `reference`.
+//! target. Their own loop is in `reference`, behind the feature of that name.
 //!
 //! A target starts with a box, or with what moves first (`start`, `detect`); then each frame passes the
 //! stages of `layered`, which filters the position by `gauss_markov`. `options` are what it is given; `shift`
@@ -16,7 +15,6 @@ mod layered;
 mod noise;
 mod options;
 #[cfg(feature = "reference")]
-#[path = "../../../benchmarks/rivals/gradient_reference/mod.rs"]
 pub mod reference;
 mod shift;
 mod start;
