@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn views_that_do_not_fit_are_told_with_both_shapes() {
+    fn views_that_do_not_fit_are_reported_with_both_shapes() {
         let view = |width, height| Frame::filled(width, height, 0.0f32);
         let options = EdgeDisparityOptions::default();
         let message = options.check_views(&view(20, 30), &view(21, 30)).unwrap_err().to_string();

@@ -159,7 +159,7 @@ fn thing_ahead(place: &Place, folder: &str, count: i32) {
 /// In a narrow field a rotation trades against a sideways motion and the approach: the rest of the picture
 /// tells the rotation.
 #[test]
-fn a_thing_ahead_has_its_own_time_to_contact() {
+fn an_object_ahead_has_its_own_time_to_contact() {
     let place = Place::new();
     thing_ahead(&place, "frames", 4);
     let line =
@@ -245,7 +245,7 @@ fn other_motions_that_explain_the_flow_have_a_table_of_their_own() {
 
 /// Not even a header is told to standard output before a run that can only fail.
 #[test]
-fn nothing_is_written_where_nothing_can_be_told() {
+fn nothing_is_written_where_nothing_can_be_reported() {
     let place = Place::new();
     approach(&place, "frames", 2);
     let line = "egomotion frames --intrinsics 120,120,64,48 --method windowed --time-scheme pair";
@@ -268,7 +268,7 @@ fn nothing_is_written_where_nothing_can_be_told() {
 }
 
 #[test]
-fn mistakes_are_told_before_any_work() {
+fn mistakes_are_reported_before_any_work() {
     let place = Place::new();
     approach(&place, "frames", 2);
     for (line, word) in [

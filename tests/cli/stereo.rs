@@ -178,7 +178,7 @@ fn rows_are_found_however_a_sequence_begins() {
 
 /// The right view ten rows lower, which is farther than is searched.
 #[test]
-fn rows_beyond_those_that_are_searched_are_told() {
+fn rows_beyond_those_that_are_searched_are_reported() {
     let lower = |index: usize| {
         let [left, right] = views(index);
         [left, (0..WIDTH * HEIGHT).map(|i| right[(i / WIDTH).max(10) * WIDTH - 10 * WIDTH + i % WIDTH]).collect()]
@@ -272,7 +272,7 @@ fn an_interrupted_run_leaves_whole_files_only() {
 }
 
 #[test]
-fn disparities_that_a_format_cannot_hold_are_told() {
+fn disparities_that_a_format_cannot_hold_are_reported() {
     let place = recorded(1);
     let ended = place.good("stereo right left --disparities -8,8 -o d.png --row-offset 0");
     assert!(ended.err.contains("do not fit the kitti format"), "{}", ended.err);

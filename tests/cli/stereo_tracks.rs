@@ -92,7 +92,7 @@ fn every_option_of_the_tracker_changes_what_it_is_said_to() {
 }
 
 #[test]
-fn tracks_are_drawn_and_told() {
+fn tracks_are_drawn_and_reported() {
     let place = recorded_as(3, moving);
     let line = format!(
         "track left right {SMALL} --mode paper --overlay p --disparity-overlay p --enlarge 2 --graph g.png --cameras 200,0.1,-10"

@@ -118,7 +118,7 @@ fn an_interrupted_single_file_does_not_appear() {
 }
 
 #[test]
-fn rows_of_an_interrupted_run_are_told_by_the_name_they_have() {
+fn rows_of_an_interrupted_run_are_reported_by_the_name_they_have() {
     for tell in ["", " --json"] {
         let place = Place::new();
         let mut child = start(&place, &format!("flow - -o t.csv --points 20,20{tell}"));
@@ -142,7 +142,7 @@ fn rows_of_an_interrupted_run_are_told_by_the_name_they_have() {
 
 /// With pictures beside it, and before there is any row.
 #[test]
-fn a_table_of_motions_that_was_interrupted_is_told_by_the_name_it_has() {
+fn a_table_of_motions_that_was_interrupted_is_reported_by_the_name_it_has() {
     let line = "egomotion - --intrinsics 60,60,32,24 --method windowed --time-scheme pair --spacing 6 --no-robust --picture pictures --alternatives others.csv -o motion.csv --json";
     for frames in [1, 4] {
         let place = Place::new();

@@ -17,7 +17,7 @@ fn factor_solves_and_mends() {
 }
 
 #[test]
-fn faults_are_told_and_rounding_is_none() {
+fn faults_are_reported_and_rounding_is_none() {
     for good in [[0.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0], [1.0, 1.0 + 1e-12, 1.0, 1.0], [4.0, 1.0, 1.0, 1e9]] {
         assert_eq!(covariance_fault(&good, 2), None, "{good:?}");
         assert_eq!(mend(&mut good.clone(), 2), Some(false), "{good:?}");

@@ -3,7 +3,7 @@
 use jacoflow::image::picture::{ClusterMark, Picture, Rgb, cluster_picture, identity_colour};
 
 #[test]
-fn numbers_have_colours_that_can_be_told_apart() {
+fn numbers_have_colours_that_differ() {
     let colours: Vec<Rgb> = (0..16).map(identity_colour).collect();
     let apart = |a: Rgb, b: Rgb| (0..3).map(|c| u32::from(a[c].abs_diff(b[c]))).sum::<u32>();
     for (i, &a) in colours.iter().enumerate() {

@@ -231,7 +231,7 @@ fn precisions_are_inverses_and_exist_where_rounding_leaves_none() {
 }
 
 #[test]
-fn components_begin_where_they_are_told() {
+fn components_begin_where_they_are_given() {
     let (x, f) = clusters(500, 3, 8);
     let points = Points { dimensions: 3, values: &x, weights: Some(&f) };
     let all = fit(&points, &options(5, 60), Start::Seeds).unwrap();

@@ -49,7 +49,7 @@ fn a_narrow_field_is_not_trusted() {
 /// A rotation that adds the same to all depths turns them round: in a narrow field a sideways motion has its
 /// opposite beside it.
 #[test]
-fn the_opposite_motion_is_told_where_depths_do_not_exclude_it() {
+fn the_opposite_motion_is_reported_where_depths_do_not_exclude_it() {
     let lateral = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
     for seed in 0..10 {
         let narrow = Scene::new(lateral, 300, 0.05, 0.03, seed, |_, _, r| 0.5 + r);

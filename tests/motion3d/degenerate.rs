@@ -14,7 +14,7 @@ fn run(scene: &Scene, noise: &Noise<'_>) -> MotionEstimate {
 }
 
 #[test]
-fn too_few_points_are_told() {
+fn too_few_points_are_reported() {
     let scene = Scene::oblique(4, 0.0, 1);
     let found = run(&scene, &Noise::StandardDeviation(1e-3));
     assert_eq!(found.status, Status::TooFewPoints);
@@ -73,7 +73,7 @@ fn a_camera_that_only_turns_or_stands_still() {
 
 /// The unknown noise must not hide a translation, nor invent one, by the number of points.
 #[test]
-fn turning_is_told_from_moving_in_unknown_noise() {
+fn turning_is_distinguished_from_moving_in_unknown_noise() {
     for n in [20, 60, 200, 1000] {
         for seed in 0..10 {
             let turning = Scene::new(Motion { translation: [0.0; 3], rotation: W }, n, 0.6, 0.01, seed, |_, _, _| 0.0);
@@ -115,7 +115,7 @@ type Layout<'a> = Box<dyn Fn(u64) -> [f64; 2] + 'a>;
 /// whatever
 /// noise seems to add.
 #[test]
-fn points_that_do_not_tell_of_all_unknowns() {
+fn points_that_do_not_determine_all_unknowns() {
     let motion = Motion::new([0.6, 0.2, 0.75], W);
     let epipole = [0.8, 0.2 / 0.75];
     let rng = CounterRng::new(3);
@@ -177,7 +177,7 @@ fn the_same_flow_everywhere() {
 }
 
 #[test]
-fn noise_as_large_as_the_flow_is_told() {
+fn noise_as_large_as_the_flow_is_reported() {
     let scene = Scene::oblique(60, 0.6, 8);
     let found = run(&scene, &Noise::StandardDeviation(0.6));
     assert!(

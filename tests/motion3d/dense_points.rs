@@ -59,7 +59,7 @@ fn outliers_are_judged_by_their_own_errors() {
 }
 
 #[test]
-fn little_translation_is_told_from_none() {
+fn little_translation_is_distinguished_from_none() {
     let motion = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
     let (mut found, mut without, mut none) = (0, 0, 0);
     for seed in 0..40 {

@@ -193,7 +193,7 @@ fn smoothed_weights_are_as_good_on_a_curve() {
 }
 
 #[test]
-fn fast_turns_without_translation_are_told() {
+fn fast_turns_without_translation_are_reported() {
     for turn in [0.15, 0.3] {
         for (robust, share) in [(false, 0.0), (true, 0.3)] {
             for seed in 0..6 {

@@ -132,7 +132,7 @@ fn estimates_solve_their_equations() {
 }
 
 #[test]
-fn noise_alone_is_told_by_its_variance() {
+fn noise_alone_is_reported_by_its_variance() {
     let mut sure = 0;
     for seed in 0..200 {
         let noise = flow(&[0.0; 100], 0.0, 1.0, seed);
@@ -145,7 +145,7 @@ fn noise_alone_is_told_by_its_variance() {
 }
 
 #[test]
-fn mistakes_are_told_by_name() {
+fn mistakes_are_reported_by_name() {
     let refused = |flow: &[[f64; 2]], noise_std, word: &str| {
         for weights in ALL {
             let error = estimate_lateral(flow, noise_std, weights).unwrap_err().to_string();

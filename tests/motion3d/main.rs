@@ -168,7 +168,7 @@ fn six_numbers_a_patch_reach_their_bound() {
 }
 
 #[test]
-fn patches_that_only_turn_or_lie_in_one_plane_are_told() {
+fn patches_that_only_turn_or_lie_in_one_plane_are_reported() {
     let camera = Intrinsics::pinhole((500.0, 500.0), (320.0, 240.0)).unwrap();
     let turning = Motion { translation: [0.0; 3], rotation: [0.002, -0.003, 0.001] };
     let options = MotionOptions { placement: Placement::Start, ..MotionOptions::default() };

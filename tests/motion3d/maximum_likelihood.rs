@@ -7,7 +7,7 @@ use jacoflow::motion3d::*;
 /// Two minima of one scene are as hard to separate for maximum likelihood as they are for the smoothed
 /// weights.
 #[test]
-fn maximum_likelihood_tells_of_other_minima_too() {
+fn maximum_likelihood_reports_other_minima_too() {
     let (mut undecided, mut sure) = (0, 0);
     for seed in 0..150 {
         let rng = CounterRng::new(4000 + seed);
@@ -26,7 +26,7 @@ fn maximum_likelihood_tells_of_other_minima_too() {
 /// By name, maximum likelihood's own theory holds while the noise of the depths matters little; where the
 /// epipole may lie among noisy points its distance from the better solution is reported.
 #[test]
-fn maximum_likelihood_tells_how_far_it_may_be() {
+fn maximum_likelihood_shows_how_far_it_may_be() {
     let ground = |_: f64, y: f64, _: f64| ground(y);
     let options = MotionOptions { method: Method::MaximumLikelihood, ..MotionOptions::default() };
     type Depth<'a> = &'a dyn Fn(f64, f64, f64) -> f64;

@@ -11,7 +11,7 @@ fn options() -> MotionOptions {
 /// A large object that overtakes moves along the camera's epipolar lines: together with the rest of the
 /// scene it can look like a sideways motion.
 #[test]
-fn a_robust_search_tells_what_else_many_points_obey() {
+fn a_robust_search_shows_what_else_many_points_share() {
     let ahead = Motion::new([0.0, 0.0, -1.0], [0.0; 3]);
     let aside = Motion::new([-0.8, 0.1, 0.3], [0.0, 0.05, 0.02]);
     for seed in 0..10 {
@@ -43,7 +43,7 @@ fn a_robust_search_tells_what_else_many_points_obey() {
 /// slow
 /// mover that is not seen in their residuals.
 #[test]
-fn a_slow_mover_is_found_or_told() {
+fn a_slow_mover_is_found_or_reported() {
     let (camera, aside) = (Motion::new([0.6, 0.2, 0.75], [0.01, -0.015, 0.005]), [-0.8, 0.1, 0.3]);
     let (mut silent, mut trusted) = (0, 0);
     for seed in 0..12 {
@@ -100,7 +100,7 @@ fn points_among_rejected_ones_do_not_pull_the_motion() {
 /// it may fit a third motion, at which every search ends. The residuals there are little larger than noise,
 /// but those of a part pull another way, and two motions explain the points better.
 #[test]
-fn what_a_thing_and_the_scene_obey_together_is_not_trusted() {
+fn what_an_object_and_the_scene_share_together_is_not_trusted() {
     let noise_std = 1e-3;
     for noise in [Noise::StandardDeviation(noise_std), Noise::Unknown, Noise::StandardDeviation(0.5 * noise_std)] {
         let (mut trusted, mut wrong) = (0, 0);

@@ -108,7 +108,7 @@ fn minima_under_noise_that_is_far_from_round_are_found() {
 
 /// Noise that is three times the given one makes errors three times as large, and the covariance nine times.
 #[test]
-fn residuals_that_the_told_noise_does_not_explain_widen_the_covariance() {
+fn residuals_that_the_given_noise_does_not_explain_widen_the_covariance() {
     let (mut held, mut factor) = (Held::default(), 0.0);
     for seed in 0..150 {
         let mut scene = Scene::oblique(200, 0.03, seed);

@@ -19,7 +19,7 @@ fn counts(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {
 }
 
 #[test]
-fn a_ground_in_large_noise_is_not_told_wrong_as_ok() {
+fn a_ground_in_large_noise_is_not_reported_wrong_as_ok() {
     let side = Motion::new([1.0, 0.3, 0.2], [0.0, 0.02, 0.0]);
     for (motion, h, noise_std) in [(side, 0.6, 0.2), (oblique(), 0.4, 0.168), (oblique(), 0.4, 0.105)] {
         let (_, wrong) = counts(100, |seed| Scene::new(motion, 500, h, noise_std, seed, |_, y, _| ground(y)));
@@ -30,7 +30,7 @@ fn a_ground_in_large_noise_is_not_told_wrong_as_ok() {
 /// Of depths near 0 half are behind the camera by noise alone, and a wrong motion may have fewer of
 /// them.
 #[test]
-fn a_ground_ahead_in_noise_as_large_as_its_flow_is_not_told_wrong_as_ok() {
+fn a_ground_ahead_in_noise_as_large_as_its_flow_is_not_reported_wrong_as_ok() {
     let ahead = Motion::new([0.06, -0.05, 1.0], [0.02, -0.03, 0.01]);
     for (n, noise_std) in [(1000, 0.2), (1000, 0.3), (6000, 0.2)] {
         let (_, wrong) = counts(30, |seed| Scene::new(ahead, n, 0.5, noise_std, seed, |_, y, _| ground(y)));
@@ -41,7 +41,7 @@ fn a_ground_ahead_in_noise_as_large_as_its_flow_is_not_told_wrong_as_ok() {
 }
 
 #[test]
-fn depths_that_tell_are_trusted() {
+fn informative_depths_are_trusted() {
     let motion = oblique();
     let (confident, wrong) = counts(60, |seed| Scene::new(motion, 500, 0.6, 0.1, seed, |x, y, _| smooth(x, y)));
     assert!(confident >= 48 && wrong == 0, "{confident} {wrong}");

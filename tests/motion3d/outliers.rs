@@ -59,7 +59,7 @@ fn few_points_do_not_choose_their_own_noise() {
 
 /// Among few points, outliers that fit by chance can decide: a known noise does not show them.
 #[test]
-fn few_points_with_outliers_are_told_in_known_noise_too() {
+fn few_points_with_outliers_are_reported_in_known_noise_too() {
     let (mut confident, mut wrong) = (0, 0);
     for seed in 0..100 {
         let scene = with_outliers(20, 8, 0.1, 2.5, seed);
@@ -82,7 +82,7 @@ fn few_points_with_outliers_are_told_in_known_noise_too() {
 
 /// A rotation that a doubtful choice of few points leaves is no surer than a motion would be.
 #[test]
-fn no_translation_is_not_told_of_few_points_with_outliers() {
+fn no_translation_is_not_reported_of_few_points_with_outliers() {
     let (mut still, mut told) = (0, 0);
     for seed in 200..260 {
         let scene = with_outliers(20, 8, 0.1, 2.5, seed);

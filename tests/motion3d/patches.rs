@@ -63,7 +63,7 @@ fn silently_wrong(truth: &Motion, n: u64, h: f64, r: f64, noise_std: f64, method
 }
 
 #[test]
-fn patches_are_not_trusted_where_they_do_not_tell() {
+fn patches_that_determine_nothing_are_not_trusted() {
     let lateral = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
     let oblique = Motion::new([0.6, 0.2, 0.75], [0.002, -0.003, 0.001]);
     let (mut confident, mut wrong) = (0, 0);

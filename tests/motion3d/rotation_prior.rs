@@ -20,7 +20,7 @@ fn estimate_with_prior(seed: u64, off: f64) -> (Scene, RotationPrior) {
 }
 
 #[test]
-fn flow_that_speaks_against_a_known_rotation_is_heard() {
+fn flow_that_speaks_against_a_known_rotation_is_reported() {
     for (method, robust, known) in [
         (Method::Efficient, false, true),
         (Method::MaximumLikelihood, false, true),
@@ -69,7 +69,7 @@ fn a_wrong_rotation_hides_no_translation_in_unknown_noise() {
 /// The more precise a wrong rotation is, the larger residuals it leaves: they are no reason to hear the
 /// flow less.
 #[test]
-fn a_wrong_rotation_that_is_told_surely_does_not_hide_itself() {
+fn a_wrong_rotation_that_is_given_surely_does_not_hide_itself() {
     for noise in [Noise::StandardDeviation(0.01), Noise::Unknown] {
         for deviation in [1e-3, 1e-4, 1e-5] {
             for seed in 0..10 {

@@ -173,7 +173,7 @@ def flat_area(kind, width, centre):
         ("balanced", "half", 256, 0.85),
     ],
 )
-def test_what_coarse_levels_leave_beneath_areas_without_texture_is_told(preset, kind, width, least):
+def test_what_coarse_levels_leave_beneath_areas_without_texture_is_reported(preset, kind, width, least):
     """In a scene that moves as a whole nothing bends, but only coarse levels see into flat areas. Where the
     area lies on the grid that deviations are told at must not matter. They may be wide, but not so wide that nothing is told."""
     y, x = np.indices((256, 256)).astype(float)
@@ -202,7 +202,7 @@ def test_what_coarse_levels_leave_beneath_areas_without_texture_is_told(preset, 
 
 @pytest.mark.parametrize("preset", ["fast", "balanced"])
 @pytest.mark.parametrize("frames", [2, 3])
-def test_texture_of_one_direction_tells_of_motion_across_it_and_not_along_it(preset, frames):
+def test_texture_of_one_direction_shows_motion_across_it_and_not_along_it(preset, frames):
     """A square of 80 px has upright stripes, the rest of the scene has texture of all directions; all of it moves as a whole."""
     y, x = np.indices((240, 320)).astype(float)
     area = np.s_[90:150, 130:190]
@@ -227,7 +227,7 @@ def test_texture_of_one_direction_tells_of_motion_across_it_and_not_along_it(pre
 
 
 @pytest.mark.parametrize(("preset", "least"), [("fast", 0.85), ("balanced", 0.85)])
-def test_areas_without_texture_are_told_as_uncertain_as_they_are(preset, least):
+def test_areas_without_texture_are_reported_as_uncertain_as_they_are(preset, least):
     """Beneath a flat patch of 50 px flow bends: it is continued from the textured sites around, and the intervals say how far motion departs from that. Without this they hold the truth
     in an eighth to three fifths of the patch. A bend that nothing shows outside the patch cannot be known: fewer than 95 of 100 intervals are asked to hold."""
     y, x = np.indices((200, 200)).astype(float)

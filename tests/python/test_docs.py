@@ -53,7 +53,7 @@ def public():
 
 
 @pytest.mark.parametrize(("name", "thing"), sorted(public(), key=lambda pair: pair[0]), ids=lambda value: value if isinstance(value, str) else "")
-def test_every_public_name_tells_shapes_or_units(name, thing):
+def test_every_public_name_shows_shapes_or_units(name, thing):
     if isinstance(thing, type) and issubclass(thing, BaseException):
         assert thing.__doc__
         return

@@ -281,6 +281,6 @@ def test_noise_that_no_covariance_can_hold_is_refused(method):
 
 
 @pytest.mark.parametrize(("method", "needed"), [("coarse_to_fine", 2), ("windowed", 2), ("lucas_kanade", 2), ("instantaneous", 3)])
-def test_a_lone_frame_is_told_how_many_suffice(method, needed):
+def test_a_lone_frame_names_how_many_suffice(method, needed):
     with pytest.raises(ValueError, match=f"frames: expected at least {needed} frames, got 1 frames"):
         jacoflow.estimate([GOOD[0]], method=method)

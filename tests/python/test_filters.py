@@ -223,7 +223,7 @@ def test_a_failing_callback_raises_its_own_error_and_changes_nothing():
         ours.predict(fx=nested)
 
 
-def test_numerical_failure_is_told():
+def test_numerical_failure_is_reported():
     points = MerweScaledSigmaPoints(2)
     with pytest.raises(NumericalError, match="P is not positive definite"):
         points.sigma_points([0.0, 0.0], -np.eye(2))

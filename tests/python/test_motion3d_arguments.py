@@ -106,7 +106,7 @@ def test_mistakes_of_a_bound_are_refused_by_name_in_short_words(change, words):
     assert len(message) < 200 and not any(mark in message for mark in ("Some(", "{", "0000")), message
 
 
-def test_mistakes_of_an_estimate_are_told_in_short_words():
+def test_mistakes_of_an_estimate_are_reported_in_short_words():
     for change, word in (
         ({"rotation_prior": (np.zeros(3), -1e300 * np.eye(3))}, "-1e300"),
         ({"initial": (np.array([1e300, np.nan, 0]), np.zeros(3))}, "(1e300, NaN, 0) and (0, 0, 0)"),

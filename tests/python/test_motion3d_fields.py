@@ -112,7 +112,7 @@ def test_options_that_a_field_does_not_have_are_refused_by_name():
             motion3d.estimate_field_motion(field, camera, **wrong)
 
 
-def test_the_rotation_of_a_scene_is_that_of_a_thing_in_it():
+def test_the_rotation_of_a_scene_is_that_of_an_object_in_it():
     """As the prior that says the same by hand."""
     frames, camera = textured_drive()
     field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))

@@ -64,7 +64,7 @@ def test_arrays_of_any_kind(robust):
     assert_array_equal(make.points, scene(200, 0.01, 3).points)
 
 
-def test_results_pickle_and_tell_the_camera():
+def test_results_pickle_and_show_the_camera():
     found = start(scene())
     copy = pickle.loads(pickle.dumps(found))
     assert_array_equal(copy.inv_depth, found.inv_depth)
@@ -171,7 +171,7 @@ def test_a_variance_of_nothing_does_not_decide_alone():
 
 
 @pytest.mark.parametrize("turn", [0, 1])
-def test_few_points_that_stand_still_are_told(turn):
+def test_few_points_that_stand_still_are_reported(turn):
     """Noise alone, or a rotation, in noise that is not told: no outliers are made of it."""
     for n in (12, 20, 40):
         told, held = 0, 0

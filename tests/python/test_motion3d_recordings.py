@@ -44,7 +44,7 @@ def test_time_to_contact_agrees_with_the_laser():
 
 
 @pytest.mark.skipif(not (DATA / "ttc_kitti_lidar").is_dir(), reason="no recordings")
-def test_the_whole_scene_moves_straight_ahead_or_it_is_told():
+def test_the_whole_scene_moves_straight_ahead_or_it_is_reported():
     """A tank lorry overtakes on a quarter of the picture: together with the other side it would fit a sideways motion."""
     for row in motion3d_car.car(DATA):
         straight = float(str(row["scene off straight ahead, deg"])) < 3

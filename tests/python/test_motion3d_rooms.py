@@ -30,7 +30,7 @@ def test_ellipsoids_hold_as_often_as_they_say(seen, method, way):
     assert row["ellipsoid"] >= least and row["ellipse"] >= least, row
 
 
-def test_a_scale_of_the_flow_that_no_residual_tells_is_in_the_rotation():
+def test_a_scale_of_the_flow_that_no_residual_shows_is_in_the_rotation():
     """Windowed flow beyond its range is too long by a tenth and more; the rotation's covariance has it, and nothing else."""
     [*_, (field, made)] = fields.fields("windowed", 1.5, fields.STEPS["quick"], 8)
     points = np.argwhere(np.asarray(field.valid))[::97, ::-1]
@@ -133,7 +133,7 @@ def test_deviations_of_patches_are_checked(name, value):
         motion3d.estimate_motion(np.eye(4)[:, :2], np.ones((4, 2)), jacobian=patches[0], cov=patches[1], **{name: value})
 
 
-def test_noise_among_outliers_that_is_larger_than_told_widens_the_covariance():
+def test_noise_among_outliers_that_is_larger_than_given_widens_the_covariance():
     pixels, flow = scene()
     rng = np.random.default_rng(9)
     flow = flow + 0.1 * rng.normal(size=flow.shape)

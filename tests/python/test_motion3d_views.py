@@ -83,7 +83,7 @@ def test_covariances_hold_in_fast_turns(turn, robust):
 
 
 @pytest.mark.parametrize("noise", [0.05, None])
-def test_a_camera_that_only_turns_fast_is_told(noise):
+def test_a_camera_that_only_turns_fast_is_reported(noise):
     axis = W / np.linalg.norm(W)
     for turn in (0.15, 0.25):
         for robust in (False, True):

@@ -48,7 +48,7 @@ WAYS = {
 
 @pytest.mark.parametrize("background", [(0, 0), (2, 1)], ids=["still", "moving"])
 @pytest.mark.parametrize("way", WAYS)
-def test_three_frames_tell_objects_as_two_do(way, background):
+def test_three_frames_show_objects_as_two_do(way, background):
     before, after = WAYS[way]
     errors = []
     for seed in range(2):

@@ -127,7 +127,7 @@ def test_local_follows_what_is_too_fast_for_one_gradient_step():
 
 
 @pytest.mark.parametrize(("step", "noise"), [(2, 8), (1, 4)])
-def test_what_counts_as_motion_is_told_from_the_background_and_not_from_the_target(step, noise):
+def test_what_counts_as_motion_is_distinguished_from_the_background_and_not_from_the_target(step, noise):
     ground, side, rng = textured(200, 256, sigma=4.0, deviation=20.0), 13, np.random.default_rng(5)
     frames, centres = [], []
     for t in range(40):

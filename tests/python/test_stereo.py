@@ -173,7 +173,7 @@ def test_uniform_views_are_empty_and_small_ones_work(method, size):
     ("left", "right"),
     [((40, 50), (40, 51)), ((16, 50), (16, 50)), ((50, 16), (50, 16)), ((0, 0), (0, 0))],
 )
-def test_views_that_do_not_fit_are_told_with_both_shapes(left, right):
+def test_views_that_do_not_fit_are_reported_with_both_shapes(left, right):
     with pytest.raises(ValueError, match="right: ") as refused:
         stereo.edge_disparity(np.zeros(left, np.uint8), np.zeros(right, np.uint8))
     assert str(left) in str(refused.value) and str(right) in str(refused.value)

@@ -45,7 +45,7 @@ def biggest(step, disparity):
     return max((c for c in step.clusters if abs(c.mean[2] - disparity) < 1.5), key=lambda c: c.n_pixels)
 
 
-def test_two_things_that_move_are_two_tracks_with_their_motions():
+def test_two_objects_that_move_are_two_tracks_with_their_motions():
     tracker, step = followed()
     wall, board = biggest(step, -4), biggest(step, 5)
     assert np.allclose(wall.velocity, [2, 0, 0], atol=0.1)
@@ -278,7 +278,7 @@ def edges_at(left, disparity):
     return np.where(np.hypot(*np.gradient(left.astype(float))) > 15, np.float32(disparity), np.float32(np.nan))
 
 
-def test_disparities_outside_of_the_range_are_left_out_and_told():
+def test_disparities_outside_of_the_range_are_left_out_and_reported():
     left, _ = next(sequence())
     disparity = edges_at(left, 5)
     near = np.isfinite(disparity)

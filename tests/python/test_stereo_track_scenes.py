@@ -168,7 +168,7 @@ def test_the_papers_mode_on_the_crossing_is_the_specifications_in_the_mean():
     assert first >= 6 and second >= 10 and pair == 16
 
 
-def test_who_goes_away_among_things_at_rest_is_followed():
+def test_who_goes_away_among_objects_at_rest_is_followed():
     """The cart, which recedes by three disparities a step."""
     scores = scored(cart(), "improved")
     assert scores.purity() >= 0.952
@@ -188,14 +188,14 @@ def test_who_is_hidden_by_another_or_for_long_is_recognised_from_parts(scene, la
     assert scores.recognised(label) is not False
 
 
-def test_small_things_are_found_and_keep_their_tracks():
+def test_small_objects_are_found_and_keep_their_tracks():
     scores = scored(tiny(), "improved")
     for label in (1, 2, 3):
         assert scores.recall(label) >= 0.98 and scores.id_kept(label) == 10
     assert scores.short_tracks() <= 0.3
 
 
-def test_what_comes_nearer_is_one_group_and_its_parts_tell_their_motion():
+def test_what_comes_nearer_is_one_group_and_its_parts_show_their_motion():
     scores = scored(curved(), "improved")
     single, share, precision = scores.grouped(1)
     assert single < 0.5 and share >= 0.96 and precision >= 0.93

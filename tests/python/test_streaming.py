@@ -189,7 +189,7 @@ def test_filter_grey_levels_do_not_depend_on_the_sample_type(frames):
         np.testing.assert_allclose(field.flow, fields[0].flow, rtol=1e-3, atol=1e-4)
 
 
-def test_progress_is_told(frames, capsys):
+def test_progress_is_reported(frames, capsys):
     told = []
     jacoflow.estimate(frames, progress=lambda done, total: told.append((done, total)))
     assert told == [(k, 6) for k in range(1, 7)]

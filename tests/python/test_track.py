@@ -86,7 +86,7 @@ def test_what_is_not_seen_coasts_and_is_lost():
     assert again.status == "tracking" and again.reacquired and np.linalg.norm(again.position - 26) < 1
 
 
-def test_the_first_thing_that_moves_is_found_without_a_box(scene):
+def test_the_first_object_that_moves_is_found_without_a_box(scene):
     frames = scene.frames()
     for start in ({}, {"center": scene.centres[0] + 5}):
         found = track.track(frames, **start)

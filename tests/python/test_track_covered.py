@@ -48,7 +48,7 @@ def test_bars_and_targets_of_any_brightness(level, bar_level, kind):
     assert np.mean([np.mean(each > 0.5) for each in reached]) >= 0.9 and min(np.mean(each > 0.5) for each in reached) >= 0.8
 
 
-def test_the_rotation_of_a_disc_is_not_told_while_it_is_covered_either():
+def test_the_rotation_of_a_disc_is_not_reported_while_it_is_covered_either():
     for seed in range(130, 134):
         scene = behind_a_bar(seed, 2.4, shape="disc")
         found = track.track(scene.frames(), scene.start_box)

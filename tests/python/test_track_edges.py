@@ -142,7 +142,7 @@ def test_even_targets_of_any_size_are_found_without_a_box(side, step):
     assert step == side or np.linalg.norm(followed.position[-1] - (65 + 11 * step + side / 2 - 0.5, 84.5 + side / 2)) < 1.5
 
 
-def test_the_first_thing_that_moves_is_found_under_a_moving_camera():
+def test_the_first_object_that_moves_is_found_under_a_moving_camera():
     scene, rng, frames = textured(128, 400), np.random.default_rng(1), []
     for t in range(30):
         picture = scene[:, 100 + 2 * t : 228 + 2 * t].copy()

@@ -28,7 +28,7 @@ def angle_error(scene, found):
 
 
 @pytest.mark.parametrize("radius", [8.0, 16.0, 24.0, 32.0])
-def test_an_angle_that_a_frame_does_not_tell_is_held(radius):
+def test_an_angle_that_a_frame_does_not_show_is_held(radius):
     """Before this background the little square is as bright as much of what is behind it; its angle must not fall back to that of the box."""
     scene = tracking_scenes.simulation(2, "smooth:2,128,40", radius)
     assert angle_error(scene, follow(scene)) <= 5.0
@@ -150,7 +150,7 @@ FENCES = [(21.0, 8.0, 4.0, 1, 0.65), (21.0, 12.0, 6.0, 1, 0.65), (45.0, 8.0, 4.0
 
 
 @pytest.mark.parametrize(("side", "gap", "bar", "moved", "least"), FENCES)
-def test_a_fence_is_gone_behind_as_often_as_told(side, gap, bar, moved, least):
+def test_a_fence_is_gone_behind_as_often_as_stated(side, gap, bar, moved, least):
     """Large targets come behind it in their first frames, when their support is not yet settled; small ones fit between two bars when they are thought smaller. On a single background either may go wrong."""
     pickets = tuple(bars((90.0 + 2.3 * moved + k * (gap + bar), 127.5), (bar, 256.0)) for k in range(int(80 // (gap + bar))))
     reached = []

@@ -51,7 +51,7 @@ def held(found, path):
 @pytest.mark.parametrize("texture", [0.0, 25.0])
 @pytest.mark.parametrize("speed", [0.6, 1.5, 3.0])
 @pytest.mark.parametrize("side", [15, 21, 41, 61])
-def test_a_target_begun_half_behind_something_still_is_told_from_it(side, speed, texture):
+def test_a_target_begun_half_behind_something_still_is_distinguished_from_it(side, speed, texture):
     path = straight((speed, 0.0), frames=int(np.clip(side / speed + 12, 30, 90)))
     found = track.track(movie(path, side, texture=texture, hidden=(0, 70)), box_about(path[0], side))
     errors = np.linalg.norm(found.position - path, axis=1)

@@ -32,7 +32,7 @@ fn nothing_to_match_is_no_offset() {
 }
 
 #[test]
-fn rows_that_cannot_be_told_are_not_doubted() {
+fn rows_that_cannot_be_reported_are_not_doubted() {
     let stripes = Frame::from_fn(180, 160, |x, _| if x / 9 % 2 == 0 { 40.0f32 } else { 180.0 });
     assert!(!find_row_offset(&stripes, &stripes, &EdgeDisparityOptions::default()).unwrap().doubtful);
 }

@@ -10,7 +10,7 @@ fn velocity_jacobian_and_paths_agree() {
 }
 
 #[test]
-fn divergence_tells_the_time_to_contact() {
+fn divergence_shows_the_time_to_contact() {
     let plane = Approach { time_to_contact: 40.0, focus_of_expansion: (10.0, 20.0) };
     let m = plane.velocity(3.0, 4.0, 15.0);
     assert!((2.0 / (m.u_x + m.v_y) - 25.0).abs() < 1e-12);

@@ -48,7 +48,7 @@ fn flow_is_the_scenes_displacement() {
 }
 
 #[test]
-fn short_times_tell_the_velocity() {
+fn short_times_show_the_velocity() {
     let scene = build("vortex", &options(&[])).unwrap();
     let (short, exact) = (mean_truth(scene.as_ref(), 2.0, (-0.01, 0.01)).unwrap(), truth(scene.as_ref(), 2.0).unwrap());
     for index in 0..exact.len() {

@@ -130,7 +130,7 @@ fn the_error_falls_with_the_root_of_the_frames() {
 /// Streams, whose estimates share frames: the error stays below the root law, down to a floor that the
 /// covariance tells, and the covariance is never too narrow.
 #[test]
-fn a_stream_tells_its_errors_down_to_the_floor() {
+fn a_stream_shows_its_errors_down_to_the_floor() {
     for (name, method, motion, noise) in [
         ("windowed", windowed(), REST, 4.0),
         ("windowed", windowed(), SLOW, 1.0),

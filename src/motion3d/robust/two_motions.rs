@@ -242,7 +242,7 @@ mod tests {
     use crate::motion3d::tests::scenes::{Scene, W, oblique};
 
     #[test]
-    fn few_points_and_residuals_far_less_than_noise_tell_nothing() {
+    fn few_points_and_residuals_far_less_than_noise_show_nothing() {
         let all: Vec<u32> = (0..400).collect();
         let turned = Motion::new(oblique().translation, W.map(|w| 2.0 * w));
         let structured = |seed: u64| {

@@ -50,7 +50,7 @@ fn affine(x: f64, y: f64) -> [f64; 6] {
 }
 
 #[test]
-fn an_affine_flow_is_told_at_the_middles() {
+fn an_affine_flow_is_reported_at_the_middles() {
     let found = field_patches(&field(1, 0.0, affine), 60, None).unwrap();
     assert_eq!(found.points.len(), 20);
     assert_eq!((found.points[0], found.points[19]), ([39.5, 29.5], [279.5, 209.5]));
@@ -92,7 +92,7 @@ fn a_bend_does_not_shift_the_middle() {
 }
 
 #[test]
-fn only_what_is_seen_is_told() {
+fn only_what_is_seen_is_reported() {
     let mut field = field(1, 0.0, affine);
     let region = Some(Rect { x: 100, y: 60, width: 130, height: 70 });
     let inside = field_patches(&field, 60, region).unwrap();
@@ -115,7 +115,7 @@ fn only_what_is_seen_is_told() {
 }
 
 #[test]
-fn a_window_over_an_edge_is_told_less_surely() {
+fn a_window_over_an_edge_is_reported_less_surely() {
     let step = |x: f64, _: f64| if x < 30.0 { [3.0, 0.0, 0.0, 0.0, 0.0, 0.0] } else { [2.0, 0.0, 0.0, 0.0, 0.0, 0.0] };
     let found = field_patches(&field(1, 0.0, step), 60, None).unwrap();
     let variance = |k: usize| found.covariances[36 * k];

@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_constant_is_told_from_a_gain_and_small_ones_are_left_alone() {
+    fn a_constant_is_distinguished_from_a_gain_and_small_ones_are_left_alone() {
         let still = Frame::from_fn(64, 48, |x, y| 60.0 + ((37 * x + 11 * y) % 80) as f64);
         let background = Background::new(&still, TargetBox::about([-1e6; 2], 0.0, 0.0));
         let told = |change: fn(f64) -> f64| {

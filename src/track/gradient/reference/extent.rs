@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn the_end_that_is_seen_tells_where_the_target_is() {
+    fn the_end_that_is_seen_shows_where_the_target_is() {
         let extent = Extent::new([20.0, 20.0]);
         let ends = [[40.0, 50.0], [10.0, 30.0]];
         // Half of it is beyond the right border, then beyond the left one, then behind an object in the

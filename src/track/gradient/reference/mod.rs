@@ -4,7 +4,8 @@
 //! (IPSJ), equations (1) to (26).
 //!
 //! A frame passes: derivative masks (`kernels`), the gradient equation in windows (`equations`), local flow
-//! and its mean over what moves (`local_flow`), the ends of what moves (`extent`), and the loop that filters and steers the window (`local_loop`).
+//! and its mean over what moves (`local_flow`), the ends of what moves (`extent`), and the loop that filters
+//! and steers the window (`local_loop`).
 
 mod equations;
 mod extent;

@@ -189,7 +189,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_small_things_in_one_component_are_parted() {
+    fn two_small_objects_in_one_component_are_parted() {
         let block = |at: [u16; 3], n: u16| (0..n).map(move |i| ([at[0] + i % 3, at[1] + i / 3 % 3, at[2]], 0));
         let result = |second: [u16; 3]| {
             let cells: Vec<_> = block([10, 10, 30], 45).chain(block(second, 45)).collect();
