@@ -15,6 +15,7 @@ from benchmarks.tables import motion3d_claims as claims
 from benchmarks.tables import motion3d_coverage as coverage
 from benchmarks.tables import motion3d_honesty as honesty
 from benchmarks.tables import motion3d_layouts as layouts
+from benchmarks.tables import motion3d_plain
 from jacoflow import motion3d
 
 Array = NDArray[np.float64]
@@ -35,13 +36,9 @@ def random_scene(seed: int, robust: bool) -> coverage.Estimated:
 
 
 def plain(seed: int, n: int) -> coverage.Estimated:
-    """Points all over 640 x 480 px, f = 500 px, inverse depths .01 to .03, unknown noise of .02 to .1 px."""
-    rng = np.random.default_rng((seed, 77))
-    u, w = scenes.motion(("oblique", "forward", "lateral", "off")[seed % 4])
-    pixels, nu = rng.uniform([0, 0], [640, 480], (n, 2)), rng.uniform(0.01, 0.03, n)
-    flow = scenes.displaced(pixels, nu, u, 0.1 * w) - pixels
-    flow += rng.uniform(0.02, 0.1) * rng.normal(size=(n, 2))
-    return motion3d.estimate_motion(pixels, flow, scenes.K, robust=True, threads=1), u, 0.1 * w
+    """A scene without any difficulty."""
+    points, flow, u, w, _ = motion3d_plain.scene(seed, n)
+    return motion3d.estimate_motion(points, flow, scenes.K, robust=True, threads=1), u, w
 
 
 def exact(seed: int) -> coverage.Estimated:
