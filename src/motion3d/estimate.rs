@@ -17,7 +17,7 @@ use super::model::whitening::Whitening;
 use super::robust;
 use super::robust::{CompetingMotion, Consensus, larger};
 use super::solver::covariance::plugged;
-use super::solver::efficient::covariance_at;
+use super::solver::efficient::{beyond_theory, covariance_at};
 use super::solver::finite_rotation::{settle, shift};
 use super::solver::likelihood::{Candidate, choose, different, minima, near_best, smoothed};
 use super::solver::profile_likelihood::ProfileLikelihood;
@@ -231,9 +231,10 @@ impl Task<'_, '_> {
         let Minimum { motion, tangent, .. } = &chosen.minimum;
         let profile = ProfileLikelihood { observations: inliers, motion, tangent };
         let bent = plugged.as_ref().is_some_and(|plugged| profile.bent(&plugged.likelihood) > 0);
+        let linear = plugged.as_ref().is_some_and(|plugged| !bent && !beyond_theory(inliers, &chosen.minimum, plugged));
         let mut improved = None;
-        if wanted || bent || plugged.is_none() {
-            improved = smoothed(inliers, self.options, motion, &mut made.unwrap_or_else(|| self.smoother(inliers)));
+        if wanted || !linear {
+            improved = smoothed(inliers, self.options, candidates, &mut made.unwrap_or_else(|| self.smoother(inliers)));
         }
         // Maximum likelihood alone is undetermined beyond its theory; a minimum from where smoothed weights
         // lead nowhere is spurious.

@@ -1,7 +1,7 @@
 //! The estimating equation with smoothed depths in its weights.
 
-use super::covariance::{damping, inverse};
-use super::profile_likelihood::ProfileLikelihood;
+use super::covariance::{PluginCovariances, damping, direction_deviation, inverse};
+use super::profile_likelihood::{ProfileLikelihood, among};
 use super::refine::Minimum;
 use super::smoothing::{DepthSmoother, Smoothed};
 use crate::motion3d::kernels::{Bilinear, depths, information, slope};
@@ -199,6 +199,19 @@ fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> Option<Moti
         }
     }
     None
+}
+
+/// By how much the standard deviation of (17) must be above the bound's for the noise of the depths to
+/// matter.
+pub(crate) const NOISY: f64 = 1.3;
+
+/// Whether (17) cannot be trusted: the noise of the depths matters, and the epipole may lie among the points.
+pub(crate) fn beyond_theory(observations: &Observations, minimum: &Minimum, plugged: &PluginCovariances) -> bool {
+    let deviation = direction_deviation(&plugged.likelihood);
+    if deviation < NOISY * direction_deviation(&plugged.bound) {
+        return false;
+    }
+    among(observations, &minimum.motion, deviation)
 }
 
 /// Mean square error of the minimum as the better solution has it, `C + d d^t` with their difference `d`, in

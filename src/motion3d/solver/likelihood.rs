@@ -126,19 +126,28 @@ pub(crate) fn choose(
     (rivals, Some(smoother))
 }
 
-/// The smoothed weights' solution from the chosen minimum.
+/// Most minima from which smoothed weights are tried.
+const TRIED: usize = 3;
+
+/// The smoothed weights' solution, from whichever of the minima leads to the likeliest: a spurious minimum,
+/// whose epipole sits among noisy points, may lead nowhere, and without the noise of its depths a motion is
+/// easier to judge.
 pub(crate) fn smoothed(
     inliers: &Observations,
     options: &MotionOptions,
-    start: &Motion,
+    candidates: &[Candidate],
     smoother: &mut DepthSmoother,
 ) -> Option<Efficient> {
-    let Some(depths) = &options.weight_depths else {
-        return efficient(inliers, start, WeightDepths::Smoothed(smoother));
-    };
-    let mut nu: Vec<f64> = inliers.source.iter().map(|&k| depths[k as usize]).collect();
-    nu.resize(inliers.stride, 0.0);
-    efficient(inliers, start, WeightDepths::Known(nu))
+    let mut starts = near_best(candidates, inliers.n).iter().take(TRIED);
+    if let Some(depths) = &options.weight_depths {
+        let mut nu: Vec<f64> = inliers.source.iter().map(|&k| depths[k as usize]).collect();
+        nu.resize(inliers.stride, 0.0);
+        return starts.find_map(|start| efficient(inliers, start.motion(), WeightDepths::Known(nu.clone())));
+    }
+    let found: Vec<Efficient> =
+        starts.filter_map(|start| efficient(inliers, start.motion(), WeightDepths::Smoothed(smoother))).collect();
+    let cost = |found: &Efficient| cost_of(inliers, smoother, &found.motion);
+    found.into_iter().map(|found| (cost(&found), found)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, best)| best)
 }
 
 /// `J`, the depths behind the camera and the depth map's roughness.

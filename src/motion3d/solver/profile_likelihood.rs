@@ -280,10 +280,10 @@ fn spread(points: &[[f64; 3]]) -> f64 {
 }
 
 /// Standard deviations of the direction within which the epipole may lie.
-const REACH: f64 = 3.0;
+pub(crate) const REACH: f64 = 3.0;
 
 /// Whether the epipole may lie among the points, of a direction known to `deviation` degrees.
-fn among(observations: &Observations, motion: &Motion, deviation: f64) -> bool {
+pub(crate) fn among(observations: &Observations, motion: &Motion, deviation: f64) -> bool {
     let reach = (REACH * deviation.to_radians()).powi(2);
     let u = motion.u();
     // On average over its two rows, |G u| is |G| / sqrt 2 for a u across the line of sight.
