@@ -162,7 +162,7 @@ impl Task<'_, '_> {
         solution.described &= shift(self.whitening, &inliers, &solution.motion) <= MAX_SHIFT;
         self.inflate(&mut solution, scaled, &inliers, candidates[0].minimum.equations.cost);
         if solution.contradicted(&inliers) {
-            solution.without_prior = Some(of_flow_alone(&inliers, &solution.motion));
+            solution.undecided = Some(of_flow_alone(&inliers, &solution.motion));
         }
         solution.alternatives = near_best(&candidates, inliers.n)[1..]
             .iter()
@@ -232,10 +232,12 @@ impl Task<'_, '_> {
         let profile = ProfileLikelihood { observations: inliers, motion, tangent };
         let bent = plugged.as_ref().is_some_and(|plugged| profile.bent(&plugged.likelihood) > 0);
         let linear = plugged.as_ref().is_some_and(|plugged| !bent && !beyond_theory(inliers, &chosen.minimum, plugged));
-        let mut improved = None;
+        let mut tried = None;
         if wanted || !linear {
-            improved = smoothed(inliers, self.options, candidates, &mut made.unwrap_or_else(|| self.smoother(inliers)));
+            let mut smoother = made.unwrap_or_else(|| self.smoother(inliers));
+            tried = smoothed(inliers, self.options, candidates, &mut smoother);
         }
+        let (mut improved, undecided) = tried.map_or((None, None), |(best, undecided)| (Some(best), undecided));
         // Maximum likelihood alone is undetermined beyond its theory; a minimum from where smoothed weights
         // lead nowhere is spurious.
         let mut described = !bent && !wanted;
@@ -244,7 +246,7 @@ impl Task<'_, '_> {
         }
         let undescribed = plugged.is_none() && improved.is_none();
         let mut solution = Solution::new(chosen, plugged.as_ref(), improved, wanted);
-        solution.described = described;
+        (solution.described, solution.undecided) = (described, undecided);
         if undescribed {
             solution.covariance = covariance_at(inliers, &solution.motion, &mut self.smoother(inliers));
         }

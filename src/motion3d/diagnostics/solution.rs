@@ -35,8 +35,9 @@ pub(crate) struct Solution {
     pub behind: f64,
     /// Whether the covariance describes the shape of the confidence region.
     pub described: bool,
-    /// The motion of the flow alone, where that contradicts what is known of the rotation.
-    pub without_prior: Option<Alternative>,
+    /// Another solution that is about as likely, or the motion of the flow alone where that contradicts what
+    /// is known of the rotation.
+    pub undecided: Option<Alternative>,
     pub status: Status,
     pub alternatives: Vec<Alternative>,
     pub likelihood: Likelihood,
@@ -72,7 +73,7 @@ impl Solution {
             likelihood_std: plugged.map_or(0.0, |plugged| direction_deviation(&plugged.likelihood)),
             behind: minimum.equations.behind,
             described: true,
-            without_prior: None,
+            undecided: None,
             status: Status::Ok,
             alternatives: Vec::new(),
             likelihood,

@@ -65,7 +65,7 @@ pub(crate) fn judge(
     if let Some((motion, excess)) = turned {
         solution.alternatives.insert(0, Alternative { motion, excess });
     }
-    if let Some(other) = solution.without_prior {
+    if let Some(other) = solution.undecided {
         solution.alternatives.retain(|known| known.motion.angle_to(&other.motion) > distinct);
         solution.alternatives.insert(0, other);
     }
@@ -95,7 +95,7 @@ pub(crate) fn judge(
         || far(inliers, &motions, deviation, solution.likelihood_std, rng.stream(1))
     {
         Status::IllConditioned
-    } else if turned.is_some() || solution.without_prior.is_some() {
+    } else if turned.is_some() || solution.undecided.is_some() {
         Status::Ambiguous
     } else if solution.low {
         Status::LowSnr

@@ -19,7 +19,7 @@ pub enum Status {
     /// The flow is that of a rotation within its noise: `u` is NaN, inverse depths are 0.
     RotationOnly,
     /// Another motion explains the flow as well, and is among the alternatives: that of a plane, the opposite
-    /// direction where depths do not exclude it, that of other points in a robust search,
+    /// direction where depths do not exclude it, another minimum, that of other points in a robust search,
     /// that of the flow by itself where it contradicts what is known of the rotation.
     Ambiguous,
     /// The points do not determine all unknowns (then there is no covariance, or no motion), the direction's

@@ -1,5 +1,6 @@
 //! Maximum likelihood over all motions, and which of several minima it was.
 
+use super::covariance::direction_deviation;
 use super::efficient::{Efficient, WeightDepths, efficient};
 use super::refine::{FEWER, MANY, Minimum, StoppingCriteria, refine};
 use super::smoothing::DepthSmoother;
@@ -9,6 +10,7 @@ use crate::motion3d::kernels::{depths, equations};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::{MotionOptions, Smoother};
+use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::rows::tangents;
 use rayon::prelude::*;
 
@@ -129,25 +131,38 @@ pub(crate) fn choose(
 /// Most minima from which smoothed weights are tried.
 const TRIED: usize = 3;
 
-/// The smoothed weights' solution, from whichever of the minima leads to the likeliest: a spurious minimum,
-/// whose epipole sits among noisy points, may lead nowhere, and without the noise of its depths a motion is
-/// easier to judge.
+/// Two solutions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)`
+/// are as likely.
+const UNDECIDED: f64 = 1.5;
+
+/// The smoothed weights' solution, from whichever of the minima leads to the likeliest, and another that is
+/// about as likely. A spurious minimum, whose epipole sits among noisy points, may lead nowhere, and without
+/// the noise of its depths a motion is easier to judge.
 pub(crate) fn smoothed(
     inliers: &Observations,
     options: &MotionOptions,
     candidates: &[Candidate],
     smoother: &mut DepthSmoother,
-) -> Option<Efficient> {
+) -> Option<(Efficient, Option<Alternative>)> {
     let mut starts = near_best(candidates, inliers.n).iter().take(TRIED);
     if let Some(depths) = &options.weight_depths {
         let mut nu: Vec<f64> = inliers.source.iter().map(|&k| depths[k as usize]).collect();
         nu.resize(inliers.stride, 0.0);
-        return starts.find_map(|start| efficient(inliers, start.motion(), WeightDepths::Known(nu.clone())));
+        let known = |start: &Candidate| efficient(inliers, start.motion(), WeightDepths::Known(nu.clone()));
+        return starts.find_map(known).map(|best| (best, None));
     }
     let found: Vec<Efficient> =
         starts.filter_map(|start| efficient(inliers, start.motion(), WeightDepths::Smoothed(smoother))).collect();
-    let cost = |found: &Efficient| cost_of(inliers, smoother, &found.motion);
-    found.into_iter().map(|found| (cost(&found), found)).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, best)| best)
+    let mut found: Vec<(f64, Efficient)> =
+        found.into_iter().map(|found| (cost_of(inliers, smoother, &found.motion), found)).collect();
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut found = found.into_iter();
+    let (least, best) = found.next()?;
+    let same = DISTINCT * direction_deviation(&best.covariance);
+    let other = found.find(|(_, other)| best.motion.angle_to(&other.motion).to_degrees() > same);
+    let other = other.map(|(cost, other)| Alternative { motion: other.motion, excess: cost - least });
+    let undecided = other.filter(|other| other.excess < UNDECIDED * (inliers.n as f64).sqrt());
+    Some((best, undecided))
 }
 
 /// `J`, the depths behind the camera and the depth map's roughness.
