@@ -9,6 +9,7 @@ const LARGEST: usize = 257;
 ///
 /// With `sigma` a pixel at `(ex, ey)` px weighs `exp(-(ex^2 + ey^2) / (2 sigma^2))` in the fit.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum Neighbourhood {
     /// `width x height` pixels, each at least 3. An odd side is centred at the site. An even side `n` covers
     /// the offsets `-(n/2 - 1) ..= n/2`, one more to the right (below) than to the left (above); the

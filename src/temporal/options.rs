@@ -131,7 +131,7 @@ impl SquareRoot {
 /// Options of [`FlowFilter`](super::FlowFilter). The default is [`FlowFilterOptions::patent`].
 ///
 /// States are `q = (I, Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y)`, 8-bit grey levels, px, frames.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FlowFilterOptions {
     /// Pixels that a measurement takes in, by default 3x3; weights are those of the fit.
     pub neighbourhood: Neighbourhood,
@@ -157,6 +157,7 @@ pub struct FlowFilterOptions {
     /// Where the filters are; every pixel by default.
     pub sites: SamplingGrid,
     /// Which pixels may be used; `None`: all.
+    #[serde(with = "saved_mask")]
     pub mask: Option<Mask>,
     /// Deliver the 6x6 covariance of the motion with each field (21 planes).
     pub covariance: bool,
@@ -166,9 +167,11 @@ pub struct FlowFilterOptions {
     pub pixel_pitch: (f64, f64),
     /// Seconds between frames, noted in the fields.
     pub frame_period: Option<f64>,
-    /// Threads; results do not depend on their number.
+    /// Threads; results do not depend on their number. They belong to the run, not to a saved state.
+    #[serde(skip)]
     pub threads: Threads,
     /// Instruction set; `None`: the best one.
+    #[serde(with = "saved_level")]
     pub simd: Option<Level>,
 }
 
@@ -269,5 +272,33 @@ impl FlowFilterOptions {
             return Err(Error::argument("mask", format!("the frames' size {}", text(frame_size)), text(mask.size())));
         }
         Ok(())
+    }
+}
+
+/// A mask as a saved state names it: whether there is one. Its pixels are an array of their own.
+mod saved_mask {
+    use super::{Deserialize, Mask};
+    use serde::{Deserializer, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(mask: &Option<Mask>, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_bool(mask.is_some())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Mask>, D::Error> {
+        Ok(bool::deserialize(from)?.then(Mask::default))
+    }
+}
+
+/// An instruction set by its name. One that this processor lacks gives way to its best one.
+mod saved_level {
+    use super::{Deserialize, Level, Serialize};
+    use serde::{Deserializer, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(level: &Option<Level>, to: S) -> Result<S::Ok, S::Error> {
+        level.map(Level::name).serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Level>, D::Error> {
+        Ok(Option::<String>::deserialize(from)?.and_then(|name| Level::parse(&name).ok()))
     }
 }

@@ -6,15 +6,12 @@
 
 use super::flow_filter::FlowFilter;
 use super::kernel::{N, PACKED};
-use super::options::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
+use super::options::FlowFilterOptions;
 use crate::error::{Error, Result};
-use crate::filter::SigmaPoints;
 use crate::io::Element;
 use crate::io::npz::{NpzReader, NpzWriter};
-use crate::jet::Neighbourhood;
-use crate::parallel::Threads;
-use crate::simd::{Level, SimdReal};
-use crate::types::{Frame, Rect, SamplingGrid, Status};
+use crate::simd::SimdReal;
+use crate::types::{Frame, Status};
 use serde::{Deserialize, Serialize};
 use std::io::{Cursor, Read, Seek, Write};
 use std::path::Path;
@@ -31,117 +28,7 @@ struct Header {
     frame_size: (usize, usize),
     frames: usize,
     repairs: u64,
-    options: SavedOptions,
-}
-
-/// The options in words and numbers; threads belong to the run, not to the state.
-#[derive(Serialize, Deserialize)]
-struct SavedOptions {
-    neighbourhood: SavedNeighbourhood,
-    form: FilterForm,
-    transition: Transition,
-    /// Absent in files of before there was a choice.
-    #[serde(default)]
-    square_root: Option<SquareRoot>,
-    process_noise: [f64; N],
-    measurement_noise: f64,
-    initial_mean: [f64; N],
-    initial_covariance: [f64; N],
-    sigma_points: SigmaPoints,
-    full_scale: f64,
-    sites: SavedSites,
-    mask: bool,
-    covariance: bool,
-    residual: bool,
-    pixel_pitch: (f64, f64),
-    frame_period: Option<f64>,
-    simd: Option<String>,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum SavedNeighbourhood {
-    Rectangle { width: usize, height: usize, sigma: Option<f64> },
-    Points { offsets: Vec<(i32, i32)>, sigma: Option<f64> },
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum SavedSites {
-    /// Region as `x, y, width, height`.
-    Grid {
-        region: Option<[usize; 4]>,
-        stride: usize,
-    },
-    Points(Vec<(usize, usize)>),
-}
-
-impl SavedOptions {
-    fn new(options: &FlowFilterOptions) -> Self {
-        let neighbourhood = match options.neighbourhood.clone() {
-            Neighbourhood::Rectangle { width, height, sigma } => SavedNeighbourhood::Rectangle { width, height, sigma },
-            Neighbourhood::Points { offsets, sigma } => SavedNeighbourhood::Points { offsets, sigma },
-        };
-        let sites = match options.sites.clone() {
-            SamplingGrid::Grid { region, stride } => {
-                SavedSites::Grid { region: region.map(|r| [r.x, r.y, r.width, r.height]), stride }
-            }
-            SamplingGrid::Points(points) => SavedSites::Points(points),
-        };
-        Self {
-            neighbourhood,
-            form: options.form,
-            transition: options.transition,
-            square_root: options.square_root,
-            process_noise: options.process_noise,
-            measurement_noise: options.measurement_noise,
-            initial_mean: options.initial_mean,
-            initial_covariance: options.initial_covariance,
-            sigma_points: options.sigma_points,
-            full_scale: options.full_scale,
-            sites,
-            mask: options.mask.is_some(),
-            covariance: options.covariance,
-            residual: options.residual,
-            pixel_pitch: options.pixel_pitch,
-            frame_period: options.frame_period,
-            simd: options.simd.map(|level| level.name().to_string()),
-        }
-    }
-
-    fn restore(self, mask: Option<Frame<bool>>) -> FlowFilterOptions {
-        let neighbourhood = match self.neighbourhood {
-            SavedNeighbourhood::Rectangle { width, height, sigma } => Neighbourhood::Rectangle { width, height, sigma },
-            SavedNeighbourhood::Points { offsets, sigma } => Neighbourhood::Points { offsets, sigma },
-        };
-        let sites = match self.sites {
-            SavedSites::Grid { region, stride } => {
-                SamplingGrid::Grid { region: region.map(|[x, y, width, height]| Rect { x, y, width, height }), stride }
-            }
-            SavedSites::Points(points) => SamplingGrid::Points(points),
-        };
-        FlowFilterOptions {
-            neighbourhood,
-            form: self.form,
-            transition: self.transition,
-            square_root: self.square_root,
-            process_noise: self.process_noise,
-            measurement_noise: self.measurement_noise,
-            initial_mean: self.initial_mean,
-            initial_covariance: self.initial_covariance,
-            sigma_points: self.sigma_points,
-            full_scale: self.full_scale,
-            sites,
-            mask,
-            covariance: self.covariance,
-            residual: self.residual,
-            pixel_pitch: self.pixel_pitch,
-            frame_period: self.frame_period,
-            threads: Threads::default(),
-            // A level that this processor lacks gives way to its best one.
-            simd: self.simd.and_then(|name| Level::parse(&name).ok()),
-        }
-    }
+    options: FlowFilterOptions,
 }
 
 impl<T: SimdReal + Element> FlowFilter<T> {
@@ -187,7 +74,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
             frame_size: self.frame_size,
             frames: self.frames,
             repairs: self.repairs,
-            options: SavedOptions::new(&self.options),
+            options: self.options.clone(),
         };
         let text = serde_json::to_string(&header).map_err(|e| Error::Numerical(format!("state header: {e}")))?;
         writer.text("header", &text)?;
@@ -208,22 +95,20 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         let path = reader.path().to_path_buf();
         let wrong = |message: String| Error::format(&path, message);
         let header = read_header(&mut reader)?;
+        let mut options = header.options;
         if header.precision != precision::<T>() {
             return Err(wrong(format!("expected a state in {}, got {}", precision::<T>(), header.precision)));
         }
         let (width, height) = header.frame_size;
-        let mask = if header.options.mask {
+        if options.mask.is_some() {
             let array = reader.array::<u8>("mask")?;
             if array.shape != [height, width] {
                 return Err(wrong(format!("expected a mask of shape [{height}, {width}], got {:?}", array.shape)));
             }
-            Some(Frame::new(width, height, array.values.iter().map(|&used| used != 0).collect())?)
-        } else {
-            None
-        };
+            options.mask = Some(Frame::new(width, height, array.values.iter().map(|&used| used != 0).collect())?);
+        }
         let mean = reader.array::<T>("mean")?;
         let covariance = reader.array::<T>("covariance")?;
-        let options = header.options.restore(mask);
         // Nothing of the claimed size is allocated before the file has shown that it holds as much.
         let status = reader.array::<u8>("status")?;
         let (columns, rows) = options.sites.shape(header.frame_size).map_err(|e| wrong(e.to_string()))?;

@@ -4,6 +4,11 @@ use crate::error::{Error, Result};
 
 /// A rectangle of pixels: columns `x .. x + width`, rows `y .. y + height`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "[usize; 4]", into = "[usize; 4]")
+)]
 pub struct Rect {
     /// First column.
     pub x: usize,
@@ -15,8 +20,21 @@ pub struct Rect {
     pub height: usize,
 }
 
+impl From<[usize; 4]> for Rect {
+    fn from([x, y, width, height]: [usize; 4]) -> Self {
+        Self { x, y, width, height }
+    }
+}
+
+impl From<Rect> for [usize; 4] {
+    fn from(Rect { x, y, width, height }: Rect) -> Self {
+        [x, y, width, height]
+    }
+}
+
 /// The pixels at which estimates are made.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
 pub enum SamplingGrid {
     /// Every `stride`-th column and row of a region (`None`: the whole frame), from its upper left corner.
     Grid {
