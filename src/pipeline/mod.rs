@@ -20,8 +20,7 @@ mod track;
 
 pub use output::{OutputPlan, OutputWish, PictureKind, Place, check_target, is_device, is_folder};
 pub use particle::{
-    BeginParticleSinks, ForegroundMaps, ParticleFrame, ParticleOverlays, ParticleRows, ParticleRun, ParticleSink,
-    TargetStart,
+    BeginParticleSinks, ForegroundMaps, ParticleFrame, ParticleRows, ParticleRun, ParticleSink, TargetStart,
 };
 pub use prefetch::{FirstFrame, READ_AHEAD, peek};
 pub use run::{Numbering, Pipeline, Summary};

@@ -5,8 +5,7 @@ use jacoflow::image::picture::TrackOverlay;
 use jacoflow::io::{Colour, ColourSource, Grey, MemorySource, read_image, read_mot};
 use jacoflow::parallel::{Progress, Silent};
 use jacoflow::pipeline::{
-    ForegroundMaps, Numbering, ParticleOverlays, ParticleRows, ParticleRun, ParticleSink, TableTarget, TargetStart,
-    TrackFormat,
+    ForegroundMaps, Numbering, Overlays, ParticleRows, ParticleRun, ParticleSink, TableTarget, TargetStart, TrackFormat,
 };
 use jacoflow::track::particle::ParticleOptions;
 use jacoflow::types::{AnyColourFrame, Frame, TargetBox};
@@ -62,7 +61,7 @@ fn start(id: u64, frame: usize) -> TargetStart {
 /// Every kind of sink in a folder.
 fn into(folder: &Path) -> Vec<Box<ParticleSink>> {
     vec![
-        Box::new(ParticleOverlays::create(folder.join("o"), TrackOverlay::default(), 25.0).unwrap()),
+        Box::new(Overlays::create(folder.join("o"), TrackOverlay::default(), 25.0).unwrap()),
         Box::new(ForegroundMaps::create(folder.join("f"), 25.0).unwrap()),
         Box::new(ParticleRows::create(&TableTarget::File(folder.join("t.txt")), TrackFormat::Mot).unwrap()),
         Box::new(ParticleRows::create(&TableTarget::File(folder.join("t.csv")), TrackFormat::Csv).unwrap()),
@@ -164,7 +163,7 @@ fn a_run_that_is_stopped_leaves_no_half_file() {
         begun.set(begun.get() + 1);
         let sequence = folder.path().join("o.y4m");
         let mut sinks = into(folder.path());
-        sinks[0] = Box::new(ParticleOverlays::create(sequence, TrackOverlay::default(), 25.0)?);
+        sinks[0] = Box::new(Overlays::create(sequence, TrackOverlay::default(), 25.0)?);
         Ok(sinks)
     };
     let mut run = ParticleRun::new(&[start(1, 0)], options(), Numbering::default());

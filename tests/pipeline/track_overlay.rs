@@ -1,7 +1,7 @@
 //! Tracks drawn over the frames: which pictures of earlier runs stay.
 
 use jacoflow::image::picture::TrackOverlay;
-use jacoflow::pipeline::{Ending, Overlays, Sink, TrackStep};
+use jacoflow::pipeline::{Ending, Overlays, TrackSink, TrackStep};
 use jacoflow::types::{AnyFrame, Frame, TargetBox, TrackState};
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,7 @@ fn names(folder: &Path) -> Vec<String> {
 
 /// A run over so many frames with one bright column; what the folder holds before it ends, and its files.
 fn run(folder: &Path, column: usize, frames: usize, ending: Ending) -> (Vec<String>, (usize, Option<PathBuf>)) {
-    let mut overlays = Overlays::create(folder, TrackOverlay::default(), 25.0).unwrap();
+    let mut overlays: Box<TrackSink> = Box::new(Overlays::create(folder, TrackOverlay::default(), 25.0).unwrap());
     let frame = AnyFrame::U8(Frame::from_fn(16, 16, |x, _| if x == column { 200 } else { 0 }));
     let states = [TrackState::at([6.0, 8.0], TargetBox::about([6.0, 8.0], 5.0, 3.0))];
     for frame_index in 0..frames {

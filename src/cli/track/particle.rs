@@ -10,8 +10,7 @@ use crate::error::{Error, Result};
 use crate::image::picture::TrackOverlay;
 use crate::parallel::Threads;
 use crate::pipeline::{
-    ForegroundMaps, Overlays, ParticleOverlays, ParticleRows, ParticleRun, ParticleSink, TableTarget, TrackFormat,
-    check_target,
+    ForegroundMaps, Overlays, ParticleRows, ParticleRun, ParticleSink, TableTarget, TrackFormat, check_target,
 };
 use serde_json::json;
 use std::path::PathBuf;
@@ -101,7 +100,7 @@ impl TrackCommand {
         let mut sinks: Vec<Box<ParticleSink>> = Vec::new();
         if let Some(path) = &self.output.overlay {
             let drawing = TrackOverlay { enlargement: self.output.enlarge, ..TrackOverlay::default() };
-            sinks.push(Box::new(ParticleOverlays::create(path, drawing, rate)?));
+            sinks.push(Box::new(Overlays::create(path, drawing, rate)?));
         }
         if let Some(path) = &self.particle.foreground {
             sinks.push(Box::new(ForegroundMaps::create(path, rate)?));

@@ -1,11 +1,9 @@
 //! From colour frames to targets followed by particle filters: source, tracker, sinks.
 
-mod foreground;
-mod overlay;
+mod pictures;
 mod rows;
 
-pub use foreground::ForegroundMaps;
-pub use overlay::ParticleOverlays;
+pub use pictures::ForegroundMaps;
 pub use rows::ParticleRows;
 
 use super::prefetch::Prefetch;

@@ -2,10 +2,11 @@
 
 use super::TrackStep;
 use crate::error::Result;
-use crate::image::picture::{GreyRange, PathPoint, TrackOverlay};
+use crate::image::picture::{GreyRange, PathPoint, Picture, TrackOverlay};
 use crate::pipeline::album::Album;
 use crate::pipeline::sink::{Ending, Sink};
-use std::collections::VecDeque;
+use crate::types::TrackState;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 
 /// How many frames of a path are drawn: memory and time of a frame stay bounded.
@@ -17,10 +18,11 @@ const STEM: &str = "track";
 /// Writes every frame with its targets as `track_000012.png`, numbered as in the input, or a sequence.
 #[derive(Debug)]
 pub struct Overlays {
-    album: Album,
-    overlay: TrackOverlay,
-    range: Option<GreyRange>,
-    paths: Vec<VecDeque<PathPoint>>,
+    pub(in crate::pipeline) album: Album,
+    pub(in crate::pipeline) overlay: TrackOverlay,
+    pub(in crate::pipeline) range: Option<GreyRange>,
+    /// By the targets' numbers.
+    paths: BTreeMap<u64, VecDeque<PathPoint>>,
 }
 
 impl Overlays {
@@ -28,7 +30,7 @@ impl Overlays {
     /// `frame_rate` frames per second that appears when it is finished.
     pub fn create(path: impl AsRef<Path>, overlay: TrackOverlay, frame_rate: f64) -> Result<Self> {
         let album = Album::create(path.as_ref(), STEM, "overlay", frame_rate)?;
-        Ok(Self { album, overlay, range: None, paths: Vec::new() })
+        Ok(Self { album, overlay, range: None, paths: BTreeMap::new() })
     }
 
     /// Refuses a folder that holds pictures of an earlier run, and a sequence that exists. Makes nothing.
@@ -39,30 +41,32 @@ impl Overlays {
         Album::check(path, STEM, "overlay")
     }
 
-    /// Remembers where the targets are.
-    fn follow(&mut self, step: &TrackStep<'_>) {
-        self.paths.resize_with(step.states.len(), VecDeque::new);
-        for (path, state) in self.paths.iter_mut().zip(step.states) {
+    /// Writes a frame with the targets of these numbers and their paths.
+    pub(in crate::pipeline) fn draw<'a>(
+        &mut self,
+        frame_index: usize,
+        mut picture: Picture,
+        targets: impl Iterator<Item = (u64, &'a TrackState)>,
+    ) -> Result<()> {
+        if self.overlay.enlargement > 1 {
+            picture = picture.enlarged(self.overlay.enlargement);
+        }
+        for (number, state) in targets {
+            let path = self.paths.entry(number).or_default();
             if path.len() == PATH_LENGTH {
                 path.pop_front();
             }
             path.push_back((state.position, state.status));
+            self.overlay.draw(&mut picture, number as usize, state, path.make_contiguous());
         }
+        self.album.add(frame_index, &picture)
     }
 }
 
 impl Sink<TrackStep<'_>> for Overlays {
     fn accept(&mut self, step: &TrackStep<'_>) -> Result<()> {
-        self.follow(step);
         let range = *self.range.get_or_insert_with(|| GreyRange::of(step.frame));
-        let mut picture = range.picture(step.frame);
-        if self.overlay.enlargement > 1 {
-            picture = picture.enlarged(self.overlay.enlargement);
-        }
-        for (index, (state, path)) in step.states.iter().zip(&mut self.paths).enumerate() {
-            self.overlay.draw(&mut picture, index + 1, state, path.make_contiguous());
-        }
-        self.album.add(step.frame_index, &picture)
+        self.draw(step.frame_index, range.picture(step.frame), (1..).zip(step.states))
     }
 
     fn finish(&mut self, ending: Ending) -> Result<()> {

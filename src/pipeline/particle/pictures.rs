@@ -1,9 +1,11 @@
-//! Foreground maps as pictures.
+//! Foreground maps, and targets over their frames, as pictures.
 
 use super::ParticleFrame;
 use crate::error::Result;
+use crate::image::picture::{GreyRange, TrackColours};
 use crate::pipeline::album::Album;
 use crate::pipeline::sink::{Ending, Sink};
+use crate::pipeline::track::Overlays;
 use std::path::{Path, PathBuf};
 
 /// First word of the files' names.
@@ -38,6 +40,23 @@ impl Sink<ParticleFrame<'_>> for ForegroundMaps {
     fn accept(&mut self, step: &ParticleFrame<'_>) -> Result<()> {
         let map = step.tracker.record().foreground()?;
         self.album.add_grey(step.frame_index, map.map(|share| (255.0 * share).round() as u8))
+    }
+
+    fn finish(&mut self, ending: Ending) -> Result<()> {
+        self.album.finish(ending)
+    }
+
+    fn files(&self) -> (usize, Option<PathBuf>) {
+        self.album.files()
+    }
+}
+
+impl Sink<ParticleFrame<'_>> for Overlays {
+    fn accept(&mut self, step: &ParticleFrame<'_>) -> Result<()> {
+        self.overlay.colours = TrackColours::Target;
+        let range = *self.range.get_or_insert_with(|| GreyRange::of_colour(step.frame));
+        let targets = step.targets.iter().map(|target| (target.id, &target.state));
+        self.draw(step.frame_index, range.colour_picture(step.frame), targets)
     }
 
     fn finish(&mut self, ending: Ending) -> Result<()> {
