@@ -191,36 +191,3 @@ pub(crate) fn refuse_colour(path: &Path) -> Error {
 fn refuse_grey(path: &Path) -> Error {
     Error::format(path, "holds grey; colour is needed (red, green and blue)")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn picture<S>(count: usize, samples: Vec<S>) -> Channels<'static, S> {
-        Channels { path: Path::new("a.png"), width: 2, height: 1, count, samples }
-    }
-
-    #[test]
-    fn colour_is_kept_for_colour_and_weighed_for_grey() {
-        let rgba = || picture(4, vec![255_u8, 0, 0, 7, 1, 2, 3, 9]);
-        assert_eq!(
-            Grey::Error.frame(rgba()).unwrap(),
-            AnyColourFrame::U8(Frame::new(2, 1, vec![[255, 0, 0], [1, 2, 3]]).unwrap())
-        );
-        assert_eq!(Colour::Luminance.frame(rgba()).unwrap(), AnyFrame::U8(Frame::new(2, 1, vec![76, 2]).unwrap()));
-        assert!(Colour::Error.frame(rgba()).unwrap_err().to_string().contains("holds colour"));
-    }
-
-    #[test]
-    fn grey_is_repeated_only_where_it_may_be() {
-        for count in [1, 2] {
-            let grey = || picture(count, vec![300_u16; 2 * count]);
-            let message = Grey::Error.frame(grey()).unwrap_err().to_string();
-            assert!(message.contains("a.png") && message.contains("colour is needed"), "{message}");
-            let repeated = AnyColourFrame::U16(Frame::filled(2, 1, [300; 3]));
-            assert_eq!(Grey::Repeat.frame(grey()).unwrap(), repeated);
-        }
-        let stored_as_rgb = picture(3, vec![0.5_f32; 6]);
-        assert_eq!(Grey::Error.frame(stored_as_rgb).unwrap(), AnyColourFrame::F32(Frame::filled(2, 1, [0.5; 3])));
-    }
-}

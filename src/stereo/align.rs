@@ -51,20 +51,3 @@ pub(super) fn match_aligned(
     }
     matches
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn whole_rows_are_copied_and_slopes_kept_between_them() {
-        let view = Frame::from_fn(5, 20, |x, y| (x + 3 * y) as f32);
-        let moved = rows_moved(&view, 2.0);
-        assert_eq!(moved.row(3), view.row(5));
-        assert_eq!(moved.row(19), view.row(19));
-        let between = rows_moved(&view, -0.25);
-        for y in 3..17 {
-            assert!((between.get(1, y) - (1.0 + 3.0 * (y as f32 - 0.25))).abs() < 1e-4);
-        }
-    }
-}

@@ -46,29 +46,3 @@ fn greatest_differences(view: &Frame<f32>) -> Option<[f32; SHARES.len()]> {
     };
     Some([at(SHARES[0])?, at(SHARES[1])?, at(SHARES[2])?, at(SHARES[3])?])
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Waves, differently arranged for each view.
-    fn view(shift: usize, of: impl Fn(f64) -> f64) -> Frame<f32> {
-        Frame::from_fn(160, 120, |x, y| {
-            let (x, y) = ((x + shift) as f64, y as f64);
-            let waves = 50.0 * (0.31 * x + 0.11 * y).sin() + 35.0 * (0.47 * x - 0.2 * y).cos() + 15.0 * (0.9 * x).sin();
-            of(110.0 + waves * (0.6 + 0.4 * (0.05 * y).sin())) as f32
-        })
-    }
-
-    #[test]
-    fn a_gain_is_taken_out_and_a_bias_left() {
-        let left = view(0, |level| level);
-        for gain in [0.3, 0.5, 0.8, 1.6] {
-            let right = view(9, |level| gain * level + 11.0);
-            let same = balanced(&left, &right);
-            assert!(matches!(same, Cow::Owned(_)), "{gain}");
-            let found = f64::from(same.get(50, 50) / right.get(50, 50)) * gain;
-            assert!((found - 1.0).abs() < 0.05, "{found} for {gain}");
-        }
-    }
-}

@@ -182,27 +182,3 @@ impl EdgeDisparityOptions {
         (low <= high).then_some((low, high))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn views_that_do_not_fit_are_reported_with_both_shapes() {
-        let view = |width, height| Frame::filled(width, height, 0.0f32);
-        let options = EdgeDisparityOptions::default();
-        let message = options.check_views(&view(20, 30), &view(21, 30)).unwrap_err().to_string();
-        assert!(message.contains("(30, 20)") && message.contains("(30, 21)"), "{message}");
-        assert!(options.check_views(&view(16, 30), &view(16, 30)).is_err());
-        let with_prior = EdgeDisparityOptions { prior: Some(view(3, 3)), ..options };
-        assert!(with_prior.check_views(&view(20, 30), &view(20, 30)).unwrap_err().to_string().starts_with("prior"));
-    }
-
-    #[test]
-    fn the_prior_narrows_the_search() {
-        let prior = Frame::new(4, 1, vec![f32::NAN, 2.4, 23.0, 40.0]).unwrap();
-        let options = EdgeDisparityOptions { prior: Some(prior), ..EdgeDisparityOptions::default() };
-        let at = |x| options.candidates(x, 0);
-        assert_eq!([at(0), at(1), at(2), at(3)], [Some((-40, 24)), Some((0, 5)), Some((20, 24)), None]);
-    }
-}

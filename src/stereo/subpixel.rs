@@ -145,38 +145,3 @@ fn between(places: &[f32; PLACES], at: f32) -> f32 {
     }
     sum
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::edges::EdgeSettings;
-    use super::*;
-
-    #[test]
-    fn shifts_of_a_smooth_pattern_are_found_and_gain_and_bias_do_not_matter() {
-        let pattern = |x: f64, y: f64| 100.0 + 40.0 * (0.35 * x + 0.05 * y).sin() + 20.0 * (0.13 * x - 0.2 * y).cos();
-        let left = Frame::from_fn(80, 60, |x, y| pattern(x as f64, y as f64) as f32);
-        let view = View::new(&left, &EdgeSettings { blur_sigma: 2.0, threshold: 2.0, classes: 12 });
-        assert!(view.edges.len() > 200);
-        for truth in [2.0f32, 2.4, 2.75, -0.6] {
-            let right =
-                Frame::from_fn(80, 60, |x, y| (1.01 * pattern(x as f64 + f64::from(truth), y as f64) + 7.0) as f32);
-            for start in [-0.45f32, 0.0, 0.4] {
-                let mut matches = vec![Some(Match { disparity: truth + start, cost: 0.1 }); view.edges.len()];
-                refine(&left, &view, &right, &mut matches);
-                let mut errors = Vec::new();
-                let places = view.edges.columns.iter().zip(&view.edges.rows);
-                for (found, (x, y)) in matches.iter().flatten().zip(places) {
-                    // Windows that reach beyond the view are not refined.
-                    if (14..66).contains(x) && (8..52).contains(y) {
-                        errors.push((found.disparity - truth).abs());
-                    }
-                }
-                errors.sort_by(f32::total_cmp);
-                assert!(
-                    errors[errors.len() / 2] < 0.01 && errors[errors.len() * 9 / 10] < 0.05,
-                    "{truth} {start} {errors:?}"
-                );
-            }
-        }
-    }
-}

@@ -151,17 +151,3 @@ fn parse_box(text: &str) -> std::result::Result<TargetBox, String> {
 fn parse_point(text: &str) -> std::result::Result<[f64; 2], String> {
     numbers(text).ok_or_else(|| "expected two numbers X,Y in pixels".into())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn boxes_come_before_points_and_nothing_means_what_moves() {
-        let none = TargetArguments { boxes: vec![], points: vec![] };
-        assert_eq!(none.starts(), [Start::Motion]);
-        let bounds = TargetBox { x: 1.0, y: 2.0, width: 3.0, height: 4.0 };
-        let both = TargetArguments { boxes: vec![bounds], points: vec![[5.0, 6.0]] };
-        assert_eq!(both.starts(), [Start::Box(bounds), Start::Centre([5.0, 6.0])]);
-    }
-}

@@ -177,38 +177,3 @@ pub(super) fn eliminate<T: SimdReal, V: Lanes<Scalar = T>>(rates: &LaneRates<V>,
     let solution = LaneSolution { motion: [f.0, f.1, x.0, x.1, y.0, y.1], trust };
     Normal { ff, xx, yy, fx, fy, xy, ff_inverse, xx_inverse, yy_inverse, wx, wy, wxy, solution }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::flow::least_squares::solve;
-    use crate::flow::model::{Affine, MotionModel};
-    use crate::jet::JetRates;
-    use crate::math::random::CounterRng;
-
-    fn rates(seed: u64) -> JetRates<f64> {
-        let rng = CounterRng::new(seed);
-        let part = |s: u64| std::array::from_fn(|k| 5.0 * rng.stream(s).normal(k as u64));
-        JetRates { jet: part(0), first: part(1), second: part(2) }
-    }
-
-    #[test]
-    fn agrees_with_the_careful_path() {
-        for seed in 0..200 {
-            let r = rates(seed);
-            let lanes = LaneRates {
-                jet: std::array::from_fn(|k| r.jet[k + 1]),
-                minus_first: r.first.map(|v| -v),
-                second: r.second,
-            };
-            let got = solve_affine(&lanes, 0.0);
-            let (a, b) = Affine::equations(&r);
-            let want = solve(&a, &b, 0.0);
-            assert!(got.trust > 0.0, "{seed}");
-            for k in 0..6 {
-                let tolerance = 1e-13 * want.condition * want.condition;
-                assert!((got.motion[k] - want.x[k]).abs() < tolerance, "{seed} {k} {} {}", got.motion[k], want.x[k]);
-            }
-        }
-    }
-}

@@ -88,13 +88,4 @@ mod tests {
             assert_eq!(bin_of(pixel, values), bin, "{pixel:?} {values}");
         }
     }
-
-    #[test]
-    fn every_pixel_is_binned_on_any_number_of_threads() {
-        let frame = Frame::from_fn(50, 70, |x, y| [x as f32 * 5.0, y as f32 * 3.0, ((x * y) % 256) as f32]);
-        let whole = colour_bins(&frame, true);
-        for (at, &bin) in whole.data().iter().enumerate() {
-            assert_eq!(bin, bin_of(frame.data()[at], true));
-        }
-    }
 }

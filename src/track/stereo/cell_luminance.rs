@@ -113,34 +113,3 @@ impl CellLuminance {
         best
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::options::VoxelGrid;
-    use super::*;
-    use crate::math::random::CounterRng;
-
-    fn lattice() -> Lattice {
-        Lattice { grid: VoxelGrid { columns: 20, rows: 15, layers: 4, first_disparity: 0 }, size: (160, 120) }
-    }
-
-    /// Blocks of random grey as large as cells, moved by whole cells.
-    fn picture(dx: i32, dy: i32) -> CellLuminance {
-        let rng = CounterRng::new(5);
-        let value = |x: usize, y: usize| {
-            let (x, y) = (x as i32 / 8 - dx + 64, y as i32 / 8 - dy + 64);
-            (255.0 * rng.uniform((y * 200 + x) as u64)) as f32
-        };
-        CellLuminance::new(&Frame::from_fn(160, 120, value), &lattice())
-    }
-
-    #[test]
-    fn a_moved_picture_is_found_again() {
-        let template: Vec<_> = (5..9).flat_map(|y| (6..11).map(move |x| [x, y])).collect();
-        for (dx, dy) in [(0, 0), (3, -2), (-6, 5)] {
-            let found = picture(0, 0).find(&template, &picture(dx, dy), 8).unwrap();
-            assert_eq!(found, Match { shift: [dx, dy], difference: 0.0 });
-        }
-        assert_ne!(picture(0, 0).find(&template, &picture(3, -2), 2).unwrap().shift, [3, -2]);
-    }
-}

@@ -144,28 +144,3 @@ fn deciles(frame: &Frame<f32>) -> Option<[f64; QUANTILES]> {
     let out: [f64; QUANTILES] = std::array::from_fn(|i| f64::from(values[(i + 1) * values.len() / (QUANTILES + 1)]));
     (out[QUANTILES - 1] - out[0] >= MIN_SAMPLES_AND_STD.1).then_some(out)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn near(found: Exposure, want: Exposure) -> bool {
-        found.difference(&want) < 0.1
-    }
-
-    #[test]
-    fn a_line_among_outliers_is_found() {
-        let want = Exposure { gain: 0.9, offset: 4.0 };
-        let pair = |i: usize| {
-            let x = 40.0 + 1.7 * (i % 100) as f64;
-            // A fifth are outliers.
-            [x, if i.is_multiple_of(5) { 220.0 - 0.5 * x } else { 0.9 * x + 4.0 + (i as f64).sin() }]
-        };
-        let pairs: Vec<[f64; 2]> = (0..500).map(pair).collect();
-        assert!(near(Exposure::of_pairs(&pairs).unwrap(), want), "{:?}", Exposure::of_pairs(&pairs));
-        // What is cut off at white does not bend it.
-        let cut: Vec<[f64; 2]> =
-            (0..500).map(|i| [f64::from(i) / 2.0, (1.5 * f64::from(i) / 2.0).min(255.0)]).collect();
-        assert!(near(Exposure::of_pairs(&cut).unwrap(), Exposure { gain: 1.5, offset: 0.0 }));
-    }
-}

@@ -163,20 +163,4 @@ mod tests {
         let everywhere = Grouping { reach: f64::INFINITY, motion: 9.0, depth_motion: 9.0 };
         assert_eq!(groups(&clusters, &motions, &everywhere), [0, 0, 0, 0, 0, 5]);
     }
-
-    #[test]
-    fn nearer_parts_of_what_comes_nearer_come_faster() {
-        // Disparities -30 and -10, 40 and 60 px from infinity at -70: parts of one object that grow by a
-        // fiftieth and by three hundredths a step.
-        let clusters = synthetic_clusters(&[([10, 5, 10], 0), ([12, 5, 30], 1)], 2);
-        let part = |growth: f64, depth: f64| {
-            let affine = [growth * -92.0, growth * -44.0, growth, 0.0, 0.0, growth];
-            Some(GroupMotion { affine, centre: [0.0, 0.0], depth })
-        };
-        let (far, near) = (part(0.02, 40.0 * 0.02), part(0.03, 60.0 * 0.03));
-        assert_eq!(groups(&clusters, &[far, near], &Grouping::default()), [0, 0]);
-        // At one distance, or going away, they would not be one.
-        assert_eq!(groups(&clusters, &[part(0.0, 0.8), part(0.0, 1.8)], &Grouping::default()), [0, 1]);
-        assert_eq!(groups(&clusters, &[part(-0.02, 0.8), part(-0.03, 1.8)], &Grouping::default()), [0, 1]);
-    }
 }

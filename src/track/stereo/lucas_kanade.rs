@@ -90,6 +90,3 @@ pub(super) fn affine_motion(
     task.descend(FINE, FINE_STEPS, &mut map, &start)?;
     task.motion_of(&map)
 }
-
-#[cfg(test)]
-mod tests;

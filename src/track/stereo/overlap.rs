@@ -77,38 +77,3 @@ pub(super) fn moved_overlaps(
     }
     row
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::clusters::tests::synthetic_clusters;
-    use super::*;
-
-    /// A block of voxels of one cluster.
-    fn block(at: [u16; 3], label: u32) -> Vec<([u16; 3], u32)> {
-        (0..16).map(|i| ([at[0] + i % 4, at[1] + i / 4, at[2]], label)).collect()
-    }
-
-    #[test]
-    fn the_shift_in_depth_is_where_most_voxels_meet() {
-        let before = synthetic_clusters(&[block([10, 10, 30], 0), block([40, 10, 30], 1)].concat(), 2);
-        let after = synthetic_clusters(&[block([12, 9, 33], 1), block([40, 10, 30], 0)].concat(), 2);
-        let depth = depth_motion(&before, 0, &after, [2, -1], 8);
-        assert_eq!(depth, Depth { shift: 3, overlaps: vec![0.0, 1.0] });
-        // Half of it is beyond: still 3, with half of the overlap.
-        let half = synthetic_clusters(&block([14, 9, 33], 1), 2);
-        assert_eq!(depth_motion(&before, 0, &half, [2, -1], 8).overlaps, [0.0, 0.5]);
-    }
-
-    #[test]
-    fn pixels_moved_by_themselves_meet_the_same() {
-        let before = synthetic_clusters(&block([10, 10, 30], 0), 1);
-        let after = synthetic_clusters(&block([12, 9, 33], 2), 3);
-        let moved = |i: usize| {
-            let [x, y, d] = before.points.at(i);
-            [x + 16.0, y - 8.0, d + 3.2]
-        };
-        assert_eq!(moved_overlaps(&before, 0, &after, moved), [0.0, 0.0, 1.0]);
-        // All of it outside.
-        assert_eq!(moved_overlaps(&before, 0, &after, |_| [-9.0, 0.0, 0.0]), [0.0, 0.0, 0.0]);
-    }
-}

@@ -161,35 +161,3 @@ impl<'a> Squares<'a> {
 fn square_of(along: f64) -> i64 {
     (along / CELL_SIDE) as i64
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A bright square from `left` to `left + 40` px on black, with a blurred outline and inner edges.
-    fn square(left: f64) -> Frame<f32> {
-        let ramp = |along: f64| (along / 1.4 + 0.5).clamp(0.0, 1.0);
-        Frame::from_fn(120, 120, |x, y| {
-            let (x, y) = (x as f64 - left, y as f64 - 40.0);
-            let shown = if (y - 20.0).abs() < 10.0 { 200.0 } else { 150.0 };
-            (ramp(x) * ramp(40.0 - x) * ramp(y) * ramp(40.0 - y) * shown) as f32
-        })
-    }
-
-    #[test]
-    fn pixels_beyond_the_outline_are_not_its_own() {
-        let frame = square(40.4);
-        let view = View { plain: &frame, smooth: &frame };
-        // The left edge, found a pixel too far left below; an edge within; the right edge where it is.
-        let edge = |x: f64, rows: std::ops::Range<i32>| rows.map(move |y| [x, f64::from(y)]);
-        let within = (46..76).step_by(3).flat_map(|x| [[f64::from(x), 51.0], [f64::from(x), 69.0]]);
-        let right: Vec<_> = edge(41.0, 44..60).chain(within).chain(edge(80.0, 44..77)).collect();
-        let beyond: Vec<_> = edge(40.0, 60..77).collect();
-        let all: Vec<_> = right.iter().chain(&beyond).copied().collect();
-        assert_eq!(own_places(&all, view), right);
-        // What is alone far away is no part of it, either.
-        let strayed: Vec<_> = right.iter().copied().chain([[110.0, 5.0]]).collect();
-        assert_eq!(own_places(&strayed, view), right);
-        assert_eq!(own_places(&[], view), [] as [[f64; 2]; 0]);
-    }
-}

@@ -41,34 +41,3 @@ pub(super) fn successors(forward: &[Row], backward: &[Row], sizes: [&[usize]; 2]
     let mut free = (0..count).filter(|k| !taken[*k]).collect::<Vec<_>>().into_iter();
     names.into_iter().map(|name| name.or_else(|| free.next()).expect("as many names as components")).collect()
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Overlaps in both directions of three components, from the shares of each that meet each.
-    fn named(shares: [[f64; 3]; 3]) -> Vec<usize> {
-        let rows: Vec<Row> = shares.iter().map(|row| row.to_vec()).collect();
-        let columns: Vec<Row> = (0..3).map(|j| shares.iter().map(|row| row[j]).collect()).collect();
-        successors(&rows, &columns, [&[50; 3]; 2], 0.4)
-    }
-
-    #[test]
-    fn all_of_a_few_pixels_counts_less_than_most_of_many() {
-        // 1, of 20 voxels, takes over 0, of 300: all of its own and most of the other's are in it.
-        let (forward, backward) = ([vec![0.05, 0.65], vec![0.0, 0.95]], [vec![1.0, 0.0], vec![0.25, 0.2]]);
-        assert_eq!(successors(&forward, &backward, [&[300, 20], &[5, 320]], 0.4), [1, 0]);
-        // Nothing of the sort where it lies in the other and stays what it is.
-        let (forward, backward) = ([vec![0.8, 0.05], vec![0.3, 0.6]], [vec![0.8, 0.02], vec![0.3, 0.6]]);
-        assert_eq!(successors(&forward, &backward, [&[300, 20], &[300, 20]], 0.4), [0, 1]);
-    }
-
-    #[test]
-    fn who_takes_over_most_of_a_component_is_it() {
-        assert_eq!(named([[0.9, 0.1, 0.0], [0.1, 0.8, 0.0], [0.0, 0.0, 1.0]]), [0, 1, 2]);
-        // 1 takes over 0, which is left with what was 1's.
-        assert_eq!(named([[0.1, 0.9, 0.0], [0.3, 0.0, 0.0], [0.0, 0.0, 1.0]]), [1, 0, 2]);
-        // In a ring.
-        assert_eq!(named([[0.0, 0.9, 0.0], [0.0, 0.0, 0.8], [0.7, 0.0, 0.0]]), [2, 0, 1]);
-    }
-}

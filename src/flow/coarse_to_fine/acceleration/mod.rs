@@ -192,23 +192,3 @@ fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
     }
     share
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::flow::coarse_to_fine::planes::SITE_SPACING;
-
-    pub(super) fn filled(f: impl Fn(usize, f64, f64) -> f64) -> Planes<f64> {
-        let mut planes = Planes::new(20, 15, MOTION);
-        for (k, y) in (0..MOTION).flat_map(|k| (0..15).map(move |y| (k, y))) {
-            let line = planes.line_mut(k, y);
-            line.iter_mut().enumerate().for_each(|(x, m)| *m = f(k, SITE_SPACING * x as f64, SITE_SPACING * y as f64));
-        }
-        planes
-    }
-
-    /// Rotation about (20, 15) px with `w` radians a frame.
-    pub(super) fn rotation(w: f64) -> Planes<f64> {
-        filled(|k, x, y| [-w * (y - 15.0), w * (x - 20.0), 0.0, w, -w, 0.0][k])
-    }
-}

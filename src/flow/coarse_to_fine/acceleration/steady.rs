@@ -149,36 +149,3 @@ fn derive<T: SimdReal>(flow: &mut Planes<T>) {
 fn slope<T: SimdReal>(from: T, to: T, sites: usize) -> T {
     T::from_f64((to.to_f64() - from.to_f64()) / (SITE_SPACING * sites.max(1) as f64))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::flow::coarse_to_fine::acceleration::tests::{filled, rotation};
-
-    /// Largest difference of two motions, without the border.
-    fn difference(a: &Planes<f64>, b: &Planes<f64>) -> f64 {
-        let sites = (1..a.height - 1).flat_map(|y| (1..a.width - 1).map(move |x| (x, y)));
-        sites.flat_map(|(x, y)| (0..MOTION).map(move |k| (a.at(k, x, y) - b.at(k, x, y)).abs())).fold(0.0, f64::max)
-    }
-
-    #[test]
-    fn fast_rotation_goes_on_in_its_circle() {
-        // Rotating by `w` a frame, a particle's earlier and later positions meet nearer to the centre by cos
-        // w, and the mean step is sin w.
-        let (w, space) = (0.3_f64, PlanePool::default());
-        let mean = rotation(w.tan());
-        let acceleration = refine_acceleration(&space, &mean, half_acceleration(&space, &mean));
-        let want = filled(|k, x, y| (w.cos() - 1.0) * [x - 20.0, y - 15.0, 1.0, 0.0, 0.0, 1.0][k]);
-        // Near the centre, where nothing leaves the frame.
-        let (x, y) = (14, 10);
-        let error = |c: &Planes<f64>| (c.at(0, x, y) - want.at(0, x, y)).hypot(c.at(1, x, y) - want.at(1, x, y));
-        let slow = half_acceleration(&space, &mean);
-        assert!(error(&slow) > 0.03 && error(&acceleration) < 0.005, "{} {}", error(&slow), error(&acceleration));
-        let next = next_step(&space, &mean, &want);
-        let turned = filled(|k, x, y| {
-            let (x, y, c, s) = (x - 20.0, y - 15.0, w.cos() - 1.0, w.sin());
-            [c * x - s * y, s * x + c * y, c, s, -s, c][k]
-        });
-        assert!(difference(&next, &turned) < 1e-12);
-    }
-}
