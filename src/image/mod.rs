@@ -26,7 +26,7 @@ pub use luminance::luminance;
 pub use preprocess::Preprocess;
 pub use pyramid::{halve, halve_into, halve_mask, halved_noise, halved_size};
 pub use quantise::Quantiser;
-pub use sample::Interpolation;
+pub use sample::{Interpolation, lagrange_at};
 pub use smooth::GaussianSmoother;
 pub use spline::Spline;
 pub use structure_tensor::StructureTensor;

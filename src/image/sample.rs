@@ -51,6 +51,40 @@ impl Interpolation {
     }
 }
 
+/// Brightness at `(x, y)` px by the polynomials of degree 5 through six pixels along each axis; beyond the
+/// border its pixels go on. NaN where one of these pixels is NaN. The frame must not be empty.
+pub fn lagrange_at<T: Real>(frame: &Frame<T>, x: f64, y: f64) -> T {
+    let ((left, along), (top, down)) = (lagrange_weights(x), lagrange_weights(y));
+    let inside = |at: isize, size: usize| at.clamp(0, size as isize - 1) as usize;
+    let mut sum = 0.0;
+    for (j, weight) in down.iter().enumerate() {
+        let row = frame.row(inside(top + j as isize, frame.height()));
+        let values: [T; 6] = match usize::try_from(left).ok().and_then(|left| row.get(left..left + 6)) {
+            Some(values) => std::array::from_fn(|i| values[i]),
+            None => std::array::from_fn(|i| row[inside(left + i as isize, row.len())]),
+        };
+        sum += weight * (0..6).map(|i| along[i] * values[i].to_f64()).sum::<f64>();
+    }
+    T::from_f64(sum)
+}
+
+/// The first of the six pixels around a position, and their weights.
+fn lagrange_weights(position: f64) -> (isize, [f64; 6]) {
+    let whole = position as isize;
+    let whole = if whole as f64 > position { whole - 1 } else { whole };
+    let distance = |i: usize| position - (whole - 2 + i as isize) as f64;
+    // The products of a pixel's distances from the others, inverse.
+    let mut weights = [-120.0, 24.0, -12.0, 12.0, -24.0, 120.0].map(|product: f64| 1.0 / product);
+    let (mut before, mut after) = (1.0, 1.0);
+    for i in 0..6 {
+        weights[i] *= before;
+        weights[5 - i] *= after;
+        before *= distance(i);
+        after *= distance(5 - i);
+    }
+    (whole - 2, weights)
+}
+
 /// The pixel at or before `position` and the rest; `None` outside `0..=len - 1` and for NaN.
 fn split(position: f64, len: usize) -> Option<(usize, f64)> {
     if !(position >= 0.0 && position <= len as f64 - 1.0) {

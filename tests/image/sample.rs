@@ -1,6 +1,6 @@
 //! Brightness between the pixels.
 
-use jacoflow::image::Interpolation;
+use jacoflow::image::{Interpolation, lagrange_at};
 use jacoflow::types::Frame;
 use proptest::prelude::*;
 
@@ -35,4 +35,16 @@ proptest! {
         let frame = Frame::from_fn(8, 7, |x, y| 2.0 * x as f64 - y as f64);
         prop_assert!((Interpolation::Bilinear.at(&frame, x, y) - (2.0 * x - y)).abs() < 1e-12);
     }
+}
+
+#[test]
+fn six_pixels_along_each_axis_hold_fifth_powers() {
+    let exact = |x: f64, y: f64| 1.0 + (x - 4.0).powi(5) - 2.0 * (y - 3.5).powi(5) + 0.3 * (x * y).powi(2);
+    let mut frame = Frame::from_fn(11, 10, |x, y| exact(x as f64, y as f64));
+    for (x, y) in [(4.3, 5.8), (2.0, 2.5), (7.99, 6.01), (3.0, 4.0)] {
+        assert!((lagrange_at(&frame, x, y) - exact(x, y)).abs() < 1e-9, "{x} {y}");
+    }
+    assert_eq!(lagrange_at(&frame, -5.0, 90.0), frame.get(0, 9));
+    frame.row_mut(5)[5] = f64::NAN;
+    assert!(lagrange_at(&frame, 7.5, 3.0).is_nan() && lagrange_at(&frame, 8.0, 3.0).is_finite());
 }
