@@ -128,12 +128,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("gradient.unsettled", "the covariance holds the motion of an outline that is still learned"),
     ("gradient.wild_frame", "a frame that differs from all before is passed over"),
     ("gradient.with_camera", "the target may move with the camera"),
-    ("windowed.truncation", "bias by truncation of the equations is added to the covariance"),
-    ("windowed.curvature", "bias by flow that is not affine in the window is added to the covariance"),
-    ("windowed.noise_pull", "bias by noise in the coefficients is added to the covariance"),
     ("windowed.noise_dominated", "the covariance is inflated along directions that only noise determines"),
-    ("windowed.high_frequencies", "the noise is read from the highest frequencies of the frames"),
-    ("windowed.residual", "a residual beyond noise and truncation inflates the covariance"),
 ];
 
 /// Whether the heuristic `name` acts.

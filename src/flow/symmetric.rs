@@ -1,6 +1,8 @@
-//! Symmetric 6x6 matrices as lists of their upper triangle, one a lane: Cholesky, solution, inverse.
+//! Symmetric 6x6 matrices as lists of their upper triangle, one a lane: Cholesky, solution, inverse, rank.
 
+use crate::math::Real;
 use crate::simd::Lanes;
+use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 
 /// Index of entry (i, j), i <= j, in the list of the upper triangle, row by row.
 #[inline(always)]
@@ -10,6 +12,12 @@ pub(crate) const fn upper(i: usize, j: usize) -> usize {
 
 /// Entries of the upper triangle of a symmetric 6x6 matrix.
 pub(crate) const ENTRIES: usize = 21;
+
+/// Entry (i, j) of a matrix from its upper triangle.
+#[inline(always)]
+pub(crate) fn entry<V: Copy>(list: &[V; ENTRIES], i: usize, j: usize) -> V {
+    list[upper(i.min(j), i.max(j))]
+}
 
 /// `L L^T = D N D` with D such that the diagonal is 1.
 pub(crate) struct Factor<V> {
@@ -107,11 +115,38 @@ impl<V: Lanes> Factor<V> {
     }
 }
 
+/// Rank, least-norm solution and condition number (infinite when singular) of normal equations in double
+/// precision; `tolerance` is the smallest eigenvalue ratio that counts.
+pub(crate) fn decompose<T: Real>(n: &[T; ENTRIES], right: &[T; 6], tolerance: f64, floor: f64) -> (u8, [f64; 6], f64) {
+    let matrix = Matrix6::from_fn(|i, j| entry(n, i, j).to_f64());
+    let largest = matrix.diagonal().max();
+    if !(largest.is_finite() && largest > floor) {
+        return (0, [0.0; 6], f64::INFINITY);
+    }
+    let scaled = matrix / largest;
+    let eigen = SymmetricEigen::new(scaled);
+    let top = eigen.eigenvalues.max();
+    let mut solution = Vector6::zeros();
+    let mut rank = 0;
+    let b = Vector6::from_fn(|i, _| right[i].to_f64() / largest);
+    for k in 0..6 {
+        let value = eigen.eigenvalues[k];
+        if value > tolerance * top {
+            let vector = eigen.eigenvectors.column(k);
+            solution += vector * (vector.dot(&b) / value);
+            rank += 1;
+        }
+    }
+    let least = eigen.eigenvalues.min();
+    let condition = if least > 0.0 { (top / least).sqrt() } else { f64::INFINITY };
+    (rank, solution.into(), condition)
+}
+
 #[cfg(test)]
 pub(in crate::flow) mod tests {
     use super::*;
     use crate::math::random::CounterRng;
-    use nalgebra::{DMatrix, Matrix6, Vector6};
+    use nalgebra::DMatrix;
 
     /// The normal matrix of random equations with this many different columns, as a list and as a matrix.
     pub fn random_normal(seed: u64, columns: usize) -> ([f64; ENTRIES], Matrix6<f64>) {
@@ -145,5 +180,19 @@ pub(in crate::flow) mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn full_rank_gives_the_solution_and_repeated_columns_are_counted() {
+        let want = Vector6::new(0.3, -0.2, 0.01, 0.02, -0.02, 0.01);
+        for seed in 0..20 {
+            let (list, matrix) = random_normal(seed, 6);
+            let (rank, solution, condition) = decompose(&list, &(matrix * want).into(), 1e-12, 0.0);
+            assert_eq!(rank, 6);
+            assert!((Vector6::from(solution) - want).norm() < 1e-8 && condition > 1.0);
+        }
+        let (list, _) = random_normal(5, 3);
+        assert_eq!(decompose(&list, &[1.0; 6], 1e-9, 0.0).0, 3);
+        assert_eq!(decompose(&[0.0; ENTRIES], &[0.0; 6], 1e-9, 0.0).0, 0);
     }
 }

@@ -31,69 +31,40 @@ impl Combination {
         }
     }
 
+    /// Times of the frames, in frames from the moment of the estimate.
+    pub fn times(self) -> &'static [f64] {
+        match self {
+            Self::Pair => &[-0.5, 0.5],
+            Self::Triple(TimeScheme::Central) => &[-1.0, 0.0, 1.0],
+            Self::Triple(TimeScheme::Backward) => &[-2.0, -1.0, 0.0],
+        }
+    }
+
     /// Combines the frames in a rectangle that may reach over their edges, where the result is zero.
     ///
-    /// The rectangle has its corner at column `x`, row `y` and rows of `width` samples; `out` holds the three
-    /// images one after the other.
-    #[inline(always)]
+    /// Its corner is at column `x`, row `y`, its rows have `width` samples; `out` yields two images or three.
     pub fn apply<T: SimdReal>(
         self,
         frames: &[&Frame<T>],
         (x, y): (isize, isize),
         width: usize,
-        second: bool,
-        out: [&mut [T]; 3],
+        out: std::slice::ChunksExactMut<'_, T>,
     ) {
         let (w, h) = frames[0].size();
         let from = (-x).clamp(0, width as isize) as usize;
         let to = (w as isize - x).clamp(from as isize, width as isize) as usize;
-        let [coefficient, first, other] = out;
-        let rows = coefficient.chunks_exact_mut(width).zip(first.chunks_exact_mut(width));
-        for (r, ((c, f), s)) in rows.zip(other.chunks_exact_mut(width)).enumerate() {
-            let at = y + r as isize;
-            if at < 0 || at >= h as isize || from == to {
-                c.fill(T::default());
-                f.fill(T::default());
-                s.fill(T::default());
-                continue;
-            }
-            for row in [&mut *c, &mut *f, &mut *s] {
-                row[..from].fill(T::default());
-                row[to..].fill(T::default());
-            }
-            let start = (x + from as isize) as usize;
-            let source = |k: usize| &frames[k].row(at as usize)[start..start + to - from];
-            let (c, f, s) = (&mut c[from..to], &mut f[from..to], &mut s[from..to]);
-            let half = T::from_f64(0.5);
-            match self {
-                Self::Pair => {
-                    let (a, b) = (source(0), source(1));
-                    for i in 0..c.len() {
-                        c[i] = half * (a[i] + b[i]);
-                        f[i] = b[i] - a[i];
-                    }
+        for (image, weights) in out.zip(self.weights()) {
+            image.fill(T::default());
+            for (r, row) in image.chunks_exact_mut(width).enumerate() {
+                let at = y + r as isize;
+                if at < 0 || at >= h as isize || from == to {
+                    continue;
                 }
-                Self::Triple(scheme) => {
-                    let (old, middle, new) = (source(0), source(1), source(2));
-                    match scheme {
-                        TimeScheme::Central => {
-                            c.copy_from_slice(middle);
-                            for i in 0..f.len() {
-                                f[i] = half * (new[i] - old[i]);
-                            }
-                        }
-                        TimeScheme::Backward => {
-                            c.copy_from_slice(new);
-                            for i in 0..f.len() {
-                                f[i] = new[i] - middle[i];
-                            }
-                        }
-                    }
-                    if second {
-                        for i in 0..s.len() {
-                            s[i] = (new[i] - middle[i]) - (middle[i] - old[i]);
-                        }
-                    }
+                let start = (x + from as isize) as usize;
+                for (frame, weight) in frames.iter().zip(weights).filter(|(_, weight)| *weight != 0.0) {
+                    let weight = T::from_f64(weight);
+                    let source = &frame.row(at as usize)[start..start + to - from];
+                    row[from..to].iter_mut().zip(source).for_each(|(sum, value)| *sum += weight * *value);
                 }
             }
         }
@@ -112,9 +83,7 @@ mod tests {
             let refs: Vec<&Frame<f64>> = frames.iter().take(n).collect();
             let combination = Combination::of(n, scheme);
             let mut out = vec![9.0; 3 * 35];
-            let (a, rest) = out.split_at_mut(35);
-            let (b, c) = rest.split_at_mut(35);
-            combination.apply(&refs, (-2, -1), 7, n == 3, [a, b, c]);
+            combination.apply(&refs, (-2, -1), 7, out[..n.min(3) * 35].chunks_exact_mut(35));
             for k in 0..if n == 3 { 3 } else { 2 } {
                 for y in 0..5 {
                     for x in 0..7 {

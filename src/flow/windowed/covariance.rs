@@ -1,336 +1,205 @@
-//! Covariance of the windowed estimate: sums over windows, tile by tile.
+//! Covariance of the windowed estimate: what pixel noise does to it, and its bias.
 //!
-//! To first order the error of `m = N^-1 sum_p w T_p^T A_p^T b_p` is `N^-1 sum_p w T_p^T A_p^T r_p`, `r_p`
-//! what noise leaves in the pixel's equations. Stencils and smoothing spread the noise of one sample over
-//! many pixels, so `s2 N^-1` would be far off. Instead the sum is turned round, to run over the noisy samples
-//! q: `sum_q w_q T_q^T h(q) e(q)` with `h = sum_j L_j^T d_j`, `d_j(p)` the weight of the jet's component j in
-//! `A_p^T r_p` and `L_j^T` the adjoint of the stencil. Then `Cov = s2 N^-1 S N^-1`, `S = sum_q w_q^2 T_q^T h
-//! h^T T_q`: one more pass of moments.
+//! **Noise.** The covariance of the noise is `s2 N^-1 S N^-1` with S from [`super::scores`].
 //!
-//! Smoothing by a Gaussian of variance t2 comes in between. The product of the window, of variance w2, and of
-//! the kernel about the sample q is the Gaussian of variance `w2 + t2` at q times a kernel of variance `a t2`
-//! about `a q`, `a = w2 / (w2 + t2)`. So h is smoothed by `a t2` instead of t2, samples count at the place `a
-//! q`, and the squared weights are those of a Gaussian of variance `a w2`, times `a` for each axis. The
-//! stencil's few pixels are taken to be one place.
+//! **Bias.** A second estimate is of what motion is left in frames carried along the first one: what
+//! truncation and noise in the coefficients do to the first. A third one is of one frame alone, with the
+//! motion of each pixel: what windows make of the field of estimates. Its difference k to the first shows
+//! flow that is not affine. Carried frames lack the motion of each pixel, not that of the window: the bias of
+//! the equations is the second estimate plus k, added as an outer product. Beyond what noise makes of it, k
+//! inflates the whole covariance. Both are of rows 1 to 6.
 //!
-//! Three biases have a known direction: noise in the coefficients towards
-//! zero, by `N^-1 s2 (sum_p w T^T C T) m` with C the noise's own `E[dA^T dA]`; truncation
-//! ([`super::truncation`]); and flow that is not affine in the window ([`super::bias_planes`]). None is
-//! subtracted; the outer product of the first two's sum is added and that of the third, so that the
-//! covariance is that of the whole error.
+//! **The noise's variance**, unless it is given, is the sum of squares of the second residual over its
+//! expectation. Motion boundaries and changes of lighting raise it.
 //!
-//! Unless the noise is given, its variance is read from the highest frequencies of the frames
-//! ([`super::high_frequencies`]), where motion and misfit are weak. The residual gives another, its sum of
-//! squares over its expectation `c0 sum w - tr(N^-1 S)`, which misfit can only raise: so the variance is
-//! never more than what chance allows beyond that, and where the residual is that much larger than noise and
-//! truncation explain, at motion boundaries or changes of lighting, it inflates the covariance.
+//! **Where noise passes for structure** it adds E to N on average, so that along an eigenvector of `N^-1 E`
+//! with eigenvalue a the estimate is `1 - a` of the motion. Along an edge or a grating a is near 1 and the
+//! estimate near zero for every motion. Undoing the attenuation widens the covariance by `1 / (1 - a)`.
 
-use super::bias_planes::{self, Ring};
-use super::covariance_kernels::{Outer, Pass, Scatter, Weigh};
-use super::estimate::Strip;
-use super::high_frequencies::HighFrequencies;
-use super::noise_dominated;
-use super::noise_setting::NoiseSetting;
-use super::sandwich::{PIXEL, PIXEL_MISFIT, PIXEL_NOISE, PIXEL_RESULT, Sandwich};
-use super::solve::MomentRow;
-use super::tile::{GROUP_ROWS, JetTile, Moments, Planes, Source, TILE_COLUMNS, padded};
+use super::estimate::{INVERSE, MOTION, RESIDUAL, Strip, WEIGHT};
+use super::moments::Moments;
+use super::noise::PixelNoise;
+use super::plan::Plan;
+use super::solve::normal_matrix;
+use super::tile::TILE_COLUMNS;
 use crate::ablation::keeps;
-use crate::flow::symmetric::ENTRIES;
-use crate::simd::{SimdReal, dispatch};
-use rayon::prelude::*;
-use std::ops::Range;
+use crate::flow::symmetric::{ENTRIES, entry, factor, upper};
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use nalgebra::{Matrix6, SymmetricEigen};
 
-/// Rows of one parallel task.
-const TASK_ROWS: usize = 64;
+/// Noise in no direction exceeds this share of the equations where the shares add up to less.
+const MIN_TOTAL_SHARE: f64 = 0.5;
+/// Floor of `1 - share`: closer to 1, shares are rounding errors.
+const MIN_SIGNAL_SHARE: f64 = 1e-2;
+/// What fits take of the noise in the second residual, in units of `tr(N^-1 S)`: 1 by its own and the rest by
+/// those of each pixel. With this value noise that is given and noise from the frames agree.
+const FITTED_TRACES: f64 = 1.6;
+/// Smallest share of the residual's expectation that the fit leaves. With 0.05 more than half of the sites in
+/// the corners of a frame had deviations above 5 px.
+const MIN_RESIDUAL_SHARE: f64 = 0.35;
+/// Smallest share of the window on usable pixels for the noise in its equations to be that of a whole window.
+const MIN_WHOLE_WEIGHT: f64 = 0.75;
+/// Share of the squared bias that is not noise of its estimate.
+const BIAS_WEIGHT: f64 = 0.4;
+/// The third estimate shows curvature beyond so many times what noise makes of its difference to the first.
+const CURVATURE_THRESHOLD: f64 = 2.0;
 
-impl<T: SimdReal> NoiseSetting<T> {
-    /// The upper triangle at the rows `rows` and columns `columns` of an image, which the strip holds with
-    /// the margin around them (where the frame has one): 21 planes of `rows.len() * columns.len()`, in px and
-    /// frames; with `parts` 21 more, what is left of it without the noise.
-    pub fn covariance(
-        &self,
-        (source, detail): (&Source<'_, T>, Option<&HighFrequencies<T>>),
-        strip: &Strip<T>,
-        rows: &[usize],
-        columns: &Range<usize>,
-    ) -> Vec<T> {
-        let (width, n) = (columns.len(), columns.len() * rows.len());
-        let mut planes = vec![T::nan(); if self.parts { 2 * ENTRIES } else { ENTRIES } * n];
-        if n == 0 {
-            return planes;
-        }
-        let spacing = rows.get(1).map_or(1, |second| second - rows[0]);
-        let task = (TASK_ROWS / spacing).max(1);
-        let mut bands: Vec<(&[usize], Vec<&mut [T]>)> = rows.chunks(task).map(|r| (r, Vec::new())).collect();
-        for plane in planes.chunks_mut(n) {
-            bands.iter_mut().zip(plane.chunks_mut(task * width)).for_each(|(b, p)| b.1.push(p));
-        }
-        bands.into_par_iter().for_each_init(Scratch::new, |scratch, (rows, out)| {
-            let columns = columns.clone();
-            BandTask { setting: self, source, detail, strip, scratch, rows, columns, out }.run();
-        });
-        planes
+/// Rows of the pixels' values: inverse normal matrix, the three estimates, the first's weight, the
+/// residuals of the first two.
+const ESTIMATES: usize = ENTRIES;
+const USABLE: usize = ESTIMATES + 18;
+const RESIDUALS: usize = USABLE + 1;
+/// Then the result, the noise's part of it, the variance of the noise and its share in the equations.
+const RESULT: usize = RESIDUALS + 2;
+const NOISE: usize = RESULT + ENTRIES;
+const VARIANCE: usize = NOISE + ENTRIES;
+const SHARE: usize = VARIANCE + 1;
+const ROWS: usize = SHARE + 1;
+
+/// From the sums of one row of a tile to its covariances, with `pixel` for the values of its pixels.
+///
+/// Writes to `out`, rows of `width` values, from column `to` on: the covariance of `count` pixels whose
+/// S is row `g` of `sums`, and after it what is left without the noise, if there are so many rows. The
+/// pixels lie along image row `y` from column `left` on, where all three estimates are.
+pub(super) fn write_covariances<T: SimdReal>(
+    pixel: &mut Vec<T>,
+    level: Level,
+    noise: &PixelNoise,
+    (plan, sums, g): (Plan, &Moments<T>, usize),
+    (strips, left, y): ([&Strip<T>; 3], usize, usize),
+    (out, width, to, count): (&mut [T], usize, usize, usize),
+) {
+    pixel.resize(ROWS * TILE_COLUMNS, T::default());
+    let planes = (0..ENTRIES).map(|k| (0, INVERSE + k)).chain((0..18).map(|k| (k / 6, MOTION + k % 6)));
+    let planes = planes.chain([(0, WEIGHT), (0, RESIDUAL), (1, RESIDUAL)]);
+    for (target, (strip, plane)) in pixel.chunks_exact_mut(TILE_COLUMNS).zip(planes) {
+        let grid = &strips[strip].grid;
+        let Some(j) = grid.place(y) else { continue };
+        target[..count].copy_from_slice(&grid.row(plane, j)[left - grid.columns.start..][..count]);
     }
-}
-
-/// Buffers of one thread.
-struct Scratch<T> {
-    jets: JetTile<T>,
-    /// Motion around the tile, six rows.
-    motion: Vec<T>,
-    /// Weights of the jet's components in one row: `[way][unknown][component]`.
-    weights: Vec<T>,
-    /// The planes h, before smoothing.
-    scores: Planes<T>,
-    /// Products of the smoothed h.
-    planes: Planes<T>,
-    row: Vec<T>,
-    smoothed: Vec<T>,
-    sums: Moments<T>,
-    usable: Planes<T>,
-    usable_sums: Moments<T>,
-    ring: Ring<T>,
-    /// Planes of the misfit, and two of the detail.
-    misfit: Planes<T>,
-    misfit_sums: Moments<T>,
-    /// Inverse, motion, residual, weight, moments of the usable pixels at one row of the tile; then the
-    /// result.
-    pixel: Vec<T>,
-}
-
-impl<T: SimdReal> Scratch<T> {
-    fn new() -> Self {
-        Self {
-            jets: JetTile::new(),
-            motion: Vec::new(),
-            weights: Vec::new(),
-            scores: Planes::new(),
-            planes: Planes::new(),
-            row: Vec::new(),
-            smoothed: Vec::new(),
-            sums: Moments::new(),
-            usable: Planes::new(),
-            usable_sums: Moments::new(),
-            ring: Ring::new(),
-            misfit: Planes::new(),
-            misfit_sums: Moments::new(),
-            pixel: Vec::new(),
+    dispatch(level, Combine { noise, plan, sums, g, pixel: &mut *pixel });
+    for c in 0..count {
+        let at = |row: usize| pixel[row * TILE_COLUMNS + c].to_f64();
+        let noisy = at(SHARE) > MIN_TOTAL_SHARE && at(SHARE).is_finite() && at(USABLE) > MIN_WHOLE_WEIGHT;
+        if noisy && keeps("windowed.noise_dominated") {
+            inflate(pixel, noise, c);
+        }
+    }
+    for (k, row) in out.chunks_exact_mut(width).enumerate() {
+        let part = |first: usize| &pixel[(first + k % ENTRIES) * TILE_COLUMNS..][..count];
+        row[to..to + count].copy_from_slice(part(RESULT));
+        if k >= ENTRIES {
+            row[to..].iter_mut().zip(part(NOISE)).for_each(|(whole, noise)| *whole -= *noise);
         }
     }
 }
 
-/// The covariance of a band of rows.
-struct BandTask<'a, 'b, T> {
-    setting: &'a NoiseSetting<T>,
-    source: &'a Source<'a, T>,
-    detail: Option<&'a HighFrequencies<T>>,
-    strip: &'a Strip<T>,
-    scratch: &'a mut Scratch<T>,
-    rows: &'a [usize],
-    columns: Range<usize>,
-    out: Vec<&'b mut [T]>,
+/// Widens the covariance of pixel `c` along the directions that only noise determines.
+fn inflate<T: SimdReal>(pixel: &mut [T], noise: &PixelNoise, c: usize) {
+    let at = |k: usize| pixel[k * TILE_COLUMNS + c].to_f64();
+    let matrix = |first: usize| Matrix6::from_fn(|i, j| at(first + upper(i.min(j), i.max(j))));
+    let added = noise.normal * (at(VARIANCE) * at(USABLE));
+    let Some(root) = matrix(0).cholesky().map(|factor| factor.l()) else { return };
+    let Some(back) = root.try_inverse() else { return };
+    // N^-1 E is similar to the symmetric L^T E L, N^-1 = L L^T.
+    let shares = SymmetricEigen::new(root.transpose() * added * root);
+    let s = noise.scale;
+    let unit = Matrix6::from_diagonal(&[1.0, 1.0, s, s, s, s].into());
+    let Some(unit_back) = unit.try_inverse() else { return };
+    // What undoing the attenuation adds: `1 / (1 - a)`, without what small shares do, which is a bias.
+    let added = |a: f64| a.clamp(0.0, 1.0).powi(4) / (1.0 - a).max(MIN_SIGNAL_SHARE);
+    let gain = Matrix6::from_diagonal(&shares.eigenvalues.map(added));
+    let spread = unit * root * shares.eigenvectors * gain * shares.eigenvectors.transpose() * back * unit_back;
+    let covariance = matrix(RESULT);
+    let wider = covariance + spread * covariance * spread.transpose();
+    for (i, j) in (0..6).flat_map(|i| (i..6).map(move |j| (i, j))) {
+        pixel[(RESULT + upper(i, j)) * TILE_COLUMNS + c] = T::from_f64(wider[(i, j)]);
+    }
 }
 
-impl<T: SimdReal> BandTask<'_, '_, T> {
-    fn run(mut self) {
-        let level = self.setting.level;
-        let (Some(&top), Some(&bottom)) = (self.rows.first(), self.rows.last()) else { return };
-        let radius = self.setting.squared.radius();
-        let plan = self.setting.plan();
-        self.scratch.pixel.resize(PIXEL * TILE_COLUMNS, T::default());
-        for left in self.columns.clone().step_by(TILE_COLUMNS) {
-            self.scores(left, (top, bottom));
-            self.products((top, bottom));
-            self.misfit(left, (top, bottom));
-            if !self.source.support.is_whole() {
-                self.usable(left, (top, bottom));
-            }
-            for (group, rows) in self.rows.chunks(GROUP_ROWS).enumerate() {
-                let mut centres = [0; GROUP_ROWS];
-                for (centre, y) in centres.iter_mut().zip(rows) {
-                    *centre = y - top + radius;
-                }
-                let centres = &mut centres[..rows.len()];
-                let Scratch { sums, planes, usable, usable_sums, misfit, misfit_sums, .. } = &mut *self.scratch;
-                for p in 0..plan.planes() {
-                    sums.sum(level, &self.setting.squared, planes, (p, plan.order(p), plan.base(p)), centres);
-                }
-                let (window, more) = (&self.setting.window, self.setting.window.radius() - radius);
-                for centre in centres.iter_mut() {
-                    *centre += more;
-                }
-                if !self.source.support.is_whole() {
-                    usable_sums.sum(level, window, usable, (0, 2, 0), centres);
-                }
-                for p in 0..bias_planes::PLANES + if self.detail.is_some() { 2 } else { 0 } {
-                    let (order, base) = bias_planes::place(p);
-                    misfit_sums.sum(level, window, misfit, (p, order, base), centres);
-                }
-                for g in 0..rows.len() {
-                    self.finish_row(group * GROUP_ROWS + g, g, left);
-                }
-            }
-        }
-    }
+/// `s2 N^-1 S N^-1 + b b^T` for one row of a tile.
+struct Combine<'a, T> {
+    noise: &'a PixelNoise,
+    plan: Plan,
+    sums: &'a Moments<T>,
+    g: usize,
+    pixel: &'a mut [T],
+}
 
-    /// The planes h of a tile, before smoothing: `scores` holds `way * UNKNOWNS + unknown`.
-    fn scores(&mut self, left: usize, (top, bottom): (usize, usize)) {
-        let Self { setting, source, strip, scratch, .. } = self;
-        let Scratch { jets, motion, weights, scores, .. } = &mut **scratch;
-        let (reach, spread) = (setting.reach, setting.squared.radius() + setting.smoothing.radius());
-        let count = setting.pixel.mixing.len() * setting.unknowns();
-        let (width, height) = (padded(TILE_COLUMNS + 2 * spread), bottom - top + 1 + 2 * spread);
-        scores.resize(count, width, height);
-        scores.data.fill(T::default());
-        // Pixels whose stencils reach into that rectangle.
-        let margin = (reach + spread) as isize;
-        let corner = (left as isize - margin, top as isize - margin);
-        let (wide, high) = (padded(width + 2 * reach), height + 2 * reach);
-        jets.load(source, corner, wide, high);
-        motion.resize(6 * wide, T::default());
-        weights.resize(count * 6 * wide, T::default());
-        for r in 0..high {
-            jets.row(setting.level, source, r);
-            strip.motion_row(corner.0, corner.1 + r as isize, setting.scale, motion);
-            let (motion, jets, weights) = (&motion[..], &*jets, &mut weights[..]);
-            match setting.rows {
-                1 => dispatch(setting.level, Weigh::<T, 1, 1> { setting, jets, motion, wide, weights }),
-                3 => dispatch(setting.level, Weigh::<T, 3, 3> { setting, jets, motion, wide, weights }),
-                6 => dispatch(setting.level, Weigh::<T, 6, 6> { setting, jets, motion, wide, weights }),
-                _ => dispatch(setting.level, Weigh::<T, 12, 6> { setting, jets, motion, wide, weights }),
-            }
-            dispatch(setting.level, Scatter { taps: &setting.taps, weights, wide, row: (r, reach), scores });
-        }
-    }
+impl<T: SimdReal> Kernel<T> for Combine<'_, T> {
+    type Output = ();
 
-    /// Smooths the planes h and multiplies them.
-    fn products(&mut self, (top, bottom): (usize, usize)) {
-        let Self { setting, scratch, .. } = self;
-        let plan = setting.plan();
-        let Scratch { scores, planes, row, smoothed, .. } = &mut **scratch;
-        let (radius, spread) = (setting.squared.radius(), setting.smoothing.radius());
-        let count = setting.pixel.mixing.len() * setting.unknowns();
-        let (width, height) = (padded(TILE_COLUMNS + 2 * radius), bottom - top + 1 + 2 * radius);
-        planes.resize(plan.planes(), width, height);
-        row.resize(scores.width.max(padded(width + 2 * spread)), T::default());
-        smoothed.resize(count * width, T::default());
-        for r in 0..height {
-            for (p, target) in smoothed.chunks_exact_mut(width).enumerate() {
-                if spread == 0 {
-                    let at = scores.at(p, r, 0);
-                    target.copy_from_slice(&scores.data[at..at + width]);
-                } else {
-                    let taps = &setting.smoothing.taps;
-                    let centre = (r + spread) * scores.width;
-                    let plane = scores.plane(p);
-                    let pass = Pass { source: plane, centre, stride: scores.width, len: scores.width, taps, out: row };
-                    dispatch(setting.level, pass);
-                    let pass = Pass { source: row, centre: spread, stride: 1, len: width, taps, out: target };
-                    dispatch(setting.level, pass);
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { noise, plan, sums, g, pixel } = self;
+        let mut c = 0;
+        while c < TILE_COLUMNS {
+            let at = |k: usize| V::load(&pixel[k * TILE_COLUMNS + c..]);
+            let inverse: [V; ENTRIES] = std::array::from_fn(at);
+            // Without an estimate of the carried frames there is only the first residual.
+            let known = V::constant(-1.0).lt(at(RESIDUALS + 1));
+            let squares = V::select(known, at(RESIDUALS + 1), at(RESIDUALS));
+            let fitted = V::select(known, V::constant(FITTED_TRACES), V::constant(1.0));
+            let estimate = |which: usize, k: usize| at(ESTIMATES + 6 * which + k);
+            let reliable = |value: V| V::select(known, value, V::zero());
+            let curvature: [V; 6] = std::array::from_fn(|k| reliable(estimate(2, k) - estimate(0, k)));
+            let bias: [V; 6] = std::array::from_fn(|k| reliable(estimate(1, k)) + curvature[k]);
+            let weight = at(USABLE);
+            let score = normal_matrix::<V, T>(plan, sums, (g, c));
+            // N^-1 S, of which N^-1 S N^-1 is made.
+            let spread: [[V; 6]; 6] =
+                std::array::from_fn(|i| std::array::from_fn(|k| sum(|l| (entry(&inverse, i, l), entry(&score, l, k)))));
+            let trace = (0..6).fold(V::zero(), |sum, i| sum + spread[i][i]);
+            let variance = noise.variance.map_or_else(
+                || {
+                    let expected = V::constant(noise.residual) * weight;
+                    let left = (expected - trace * fitted).max(expected * V::constant(MIN_RESIDUAL_SHARE));
+                    (squares / left).max(V::constant(noise.min_variance))
+                },
+                |given| V::constant(given),
+            );
+            // tr(N^-1 E), at least the noise's largest share of any direction's equations.
+            let added = |i: usize, k: usize| V::constant(noise.normal[(i, k)]);
+            let share = (0..6).fold(V::zero(), |all, i| all + sum(|k| (entry(&inverse, i, k), added(k, i))));
+            let mut put = |row: usize, value: V| value.store(&mut pixel[row * TILE_COLUMNS + c..]);
+            put(VARIANCE, variance);
+            put(SHARE, share * variance * weight);
+            let mut scatter = [V::zero(); ENTRIES];
+            for i in 0..6 {
+                for k in i..6 {
+                    scatter[upper(i, k)] = sum(|l| (spread[i][l], entry(&inverse, l, k))) * variance;
                 }
             }
-            if setting.rows == 1 {
-                dispatch(setting.level, Outer::<T, 2> { plan, smoothed, planes, row: r });
-            } else {
-                dispatch(setting.level, Outer::<T, 6> { plan, smoothed, planes, row: r });
+            let mut whole = scatter;
+            for i in 0..6 {
+                for k in i..6 {
+                    let square = bias[i] * bias[k];
+                    whole[upper(i, k)] = square.mul_add(V::constant(BIAS_WEIGHT), scatter[upper(i, k)]);
+                }
             }
-        }
-    }
-
-    /// The plane of usable pixels of a tile, with the margin of the window.
-    fn usable(&mut self, left: usize, (top, bottom): (usize, usize)) {
-        let radius = self.setting.window.radius();
-        let plane = &mut self.scratch.usable;
-        plane.resize(1, padded(TILE_COLUMNS + 2 * radius), bottom - top + 1 + 2 * radius);
-        let (x, y) = (left as isize - radius as isize, top as isize - radius as isize);
-        for (r, row) in plane.data.chunks_exact_mut(plane.width).enumerate() {
-            self.source.support.weights(x, y + r as isize, row);
-        }
-    }
-
-    /// The planes of the misfit and the detail, with the margin of the window.
-    fn misfit(&mut self, left: usize, (top, bottom): (usize, usize)) {
-        let Self { setting, source, detail, strip, scratch, .. } = self;
-        let Scratch { jets, ring, misfit, .. } = &mut **scratch;
-        let radius = setting.window.radius();
-        let (width, height) = (padded(TILE_COLUMNS + 2 * radius), bottom - top + 1 + 2 * radius);
-        misfit.resize(bias_planes::PLANES + if detail.is_some() { 2 } else { 0 }, width, height);
-        let corner = (left as isize - radius as isize, top as isize - radius as isize);
-        let kind = (setting.level, setting.rows);
-        ring.fill(kind, &setting.truncation, (source, strip), jets, (corner, setting.scale), misfit);
-        let Some(detail) = detail else { return };
-        for r in 0..height {
-            let y = corner.1 + r as isize;
-            let at = misfit.at(bias_planes::PLANES, r, 0);
-            source.support.weights(corner.0, y, &mut misfit.data[at..at + width]);
-            let other = misfit.at(bias_planes::PLANES + 1, r, 0);
-            let (energy, known) = misfit.data.split_at_mut(other);
-            detail.row(corner.0, y, &mut energy[at..at + width], &mut known[..width]);
-        }
-    }
-
-    /// Covariance of row `j` of the band, whose moments are row `g` of the group, at the columns of the tile
-    /// that begins at `left`.
-    fn finish_row(&mut self, j: usize, g: usize, left: usize) {
-        self.gather(j, g, left);
-        let Self { setting, scratch, .. } = self;
-        let Scratch { sums, pixel, .. } = &mut **scratch;
-        let row = MomentRow { data: &sums.data, first: g * TILE_COLUMNS, stride: GROUP_ROWS * TILE_COLUMNS };
-        dispatch(setting.level, Sandwich { setting, row, pixel });
-        let (width, count) = (self.columns.len(), (self.columns.end - left).min(TILE_COLUMNS));
-        if keeps("windowed.noise_dominated") {
-            noise_dominated::inflate_row(&setting.pixel, setting.scale, pixel, count);
-        }
-        let from = j * width + left - self.columns.start;
-        for (k, plane) in self.out.iter_mut().enumerate() {
-            let pixel = &self.scratch.pixel;
-            let row = |first: usize| &pixel[(first + k % ENTRIES) * TILE_COLUMNS..][..count];
-            let target = &mut plane[from..from + count];
-            target.copy_from_slice(row(PIXEL_RESULT));
-            if k >= ENTRIES {
-                target.iter_mut().zip(row(PIXEL_NOISE)).for_each(|(whole, noise)| *whole -= *noise);
+            // Squared curvature in units of what the covariance holds already.
+            let scaled = factor(&whole).solve(&curvature);
+            let square = sum(|k| (scaled[k], curvature[k]));
+            let excess = (square - V::constant(CURVATURE_THRESHOLD * noise.curvature)).max(V::zero());
+            let inflation = V::constant(1.0) + excess;
+            for i in 0..6 {
+                for k in i..6 {
+                    let unit = [i, k].iter().map(|a| if *a < 2 { 1.0 } else { noise.scale }).product();
+                    let unit = V::constant(unit);
+                    put(NOISE + upper(i, k), scatter[upper(i, k)] * unit);
+                    put(RESULT + upper(i, k), whole[upper(i, k)] * inflation * unit);
+                }
             }
+            c += V::LANES;
         }
     }
+}
 
-    /// Copies what the strip and the window know of row `j` of the band to `Scratch::pixel`.
-    fn gather(&mut self, j: usize, g: usize, left: usize) {
-        let Self { setting, source, detail, strip, scratch, rows, columns, .. } = self;
-        let y = rows[j];
-        let count = (columns.end - left).min(TILE_COLUMNS);
-        let n = strip.rows.len() * strip.columns.len();
-        let from = (y - strip.rows[0]) * strip.columns.len() + left - strip.columns.start;
-        let planes =
-            strip.inverse.chunks(n).chain(strip.motion.chunks(n)).chain([&strip.residual[..], &strip.weight[..]]);
-        for (row, plane) in scratch.pixel.chunks_exact_mut(TILE_COLUMNS).zip(planes) {
-            row[..count].copy_from_slice(&plane[from..from + count]);
-        }
-        let (inside_x, inside_y) = source.support.inside();
-        let v = setting.window.partial(y, inside_y.start, inside_y.end);
-        for c in 0..count {
-            let ones = if source.support.is_whole() {
-                let h = setting.window.partial(left + c, inside_x.start, inside_x.end);
-                [h[0] * v[0], h[1] * v[0], h[0] * v[1], h[2] * v[0], h[1] * v[1], h[0] * v[2]].map(T::from_f64)
-            } else {
-                std::array::from_fn(|k| scratch.usable_sums.data[(k * GROUP_ROWS + g) * TILE_COLUMNS + c])
-            };
-            for (k, one) in ones.into_iter().enumerate() {
-                scratch.pixel[(ENTRIES + 8 + k) * TILE_COLUMNS + c] = one;
-            }
-        }
-        // With u = u0 + x u_x + y u_y the entry of u_x is that of u times x, and its own.
-        let Scratch { misfit_sums, pixel, .. } = &mut **scratch;
-        let moment = |k: usize| &misfit_sums.data[(k * GROUP_ROWS + g) * TILE_COLUMNS..][..TILE_COLUMNS];
-        for p in 0..12 {
-            let (first, i) = (p / 6 * bias_planes::SCORE, p % 6);
-            let target = &mut pixel[(PIXEL_MISFIT + p) * TILE_COLUMNS..][..TILE_COLUMNS];
-            target.copy_from_slice(moment(first + 3 * (i % 2) + i / 2));
-            if i > 1 {
-                target.iter_mut().zip(moment(first + 4 + i)).for_each(|(sum, own)| *sum += *own);
-            }
-        }
-        for p in 12..bias_planes::PLANES + if detail.is_some() { 2 } else { 0 } {
-            pixel[(PIXEL_MISFIT + p) * TILE_COLUMNS..][..TILE_COLUMNS].copy_from_slice(moment(bias_planes::place(p).1));
-        }
-    }
+/// `sum_k a_k b_k` over six pairs.
+#[inline(always)]
+fn sum<V: Lanes>(pair: impl Fn(usize) -> (V, V)) -> V {
+    (0..6).fold(V::zero(), |sum, k| {
+        let (a, b) = pair(k);
+        a.mul_add(b, sum)
+    })
 }

@@ -12,16 +12,16 @@
 //! what the covariance holds: `docs/local_flow.md`.
 //!
 //! # Files, in the order of the data
-//! `options`; `run` (crop, smoothing, strips of rows) with `support` (usable pixels) and `combine` (frames to
-//! coefficients and time differences); `tile` (jets, product planes, moments) with `rows` (products of the
-//! equations) and `window` (weights); `estimate` with `solve` (normal equations, status) and
-//! `rounding_floor` (what rounding leaves of an even image); `results` (to the field).
-//! The covariance: `noise_setting` and `noise` (how pixel noise enters the equations), `jet_matrix` (their
-//! matrix as a function of the jet), `high_frequencies` (the noise of the frames), `truncation` and
-//! `bias_planes` (biases of the equations and of flow that is not affine), `covariance` with
-//! `covariance_kernels` (sums over windows), `sandwich` (one row of covariances), `noise_dominated`
-//! (directions that only noise determines). `rows`, `noise`, `bias_planes` and `covariance` take all rows to
-//! have the same weight.
+//! `options`; `run` (crop, smoothing, strips, results to the field) with `support` (usable pixels) and
+//! `combine` (frames to coefficients and time differences); `tile` (jets, product planes) with `equations`
+//! (of a pixel) and `plan` (places of products and moments); `moments` (windows); `estimate` (and frames
+//! carried along it) with `solve` (normal equations).
+//! The covariance: `noise` (how pixel noise enters the equations), `scores` (its sums over windows) and
+//! `covariance` (noise, bias and curvature together).
+//!
+//! A weight of a row enters in `equations::products` (every product of the row times the weight), in
+//! `scores::Weigh` (twice, since it weighs the right-hand side) and in `noise::PixelNoise` (`residual` and
+//! `normal`); a new set of rows also needs its name in `options::RowSet`.
 //!
 //! # Pixels without data
 //! Samples that are NaN, infinite or masked invalidate every pixel whose jet (or smoothing) reaches them: NaN
@@ -30,27 +30,19 @@
 //! pixels without a jet (a rim of one pixel for 3x3) get status `Border`. A pixel whose window reaches no
 //! invalid pixel has the same bits as without them.
 
-mod bias_planes;
 mod combine;
 mod covariance;
-mod covariance_kernels;
+mod equations;
 mod estimate;
-mod high_frequencies;
-mod jet_matrix;
+mod moments;
 mod noise;
-mod noise_dominated;
-mod noise_setting;
 mod options;
-mod results;
-mod rounding_floor;
-mod rows;
+mod plan;
 mod run;
-mod sandwich;
+mod scores;
 mod solve;
 mod support;
 mod tile;
-mod truncation;
-mod window;
 
 pub use options::{RowSet, WindowedOptions};
 pub(super) use run::Windowed;

@@ -55,6 +55,9 @@ impl RowSet {
     }
 }
 
+/// Largest window radius, px.
+const MAX_RADIUS: f64 = 256.0;
+
 /// Options of the windowed estimate with transport.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WindowedOptions {
@@ -101,12 +104,7 @@ impl WindowedOptions {
     pub fn pair() -> Self {
         Self { rows: RowSet::Gradient, frames: 2, ..Self::default() }
     }
-}
 
-/// Largest window radius, px.
-const MAX_RADIUS: f64 = 256.0;
-
-impl WindowedOptions {
     /// Refuses values that no window can have.
     ///
     /// # Errors

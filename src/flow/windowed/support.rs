@@ -7,95 +7,63 @@ use crate::math::Real;
 use crate::simd::SimdReal;
 use crate::types::{Frame, Mask, Status};
 
-/// Usable pixels of a set of frames.
+/// Why each pixel of a set of frames has no equations of its own; `Ok` where it has.
 ///
 /// A pixel is usable when its jet's neighbourhood lies in the frame and depends on no sample that is masked
 /// out or not finite; smoothing widens the dependence by its radius.
 #[derive(Debug)]
 pub(super) struct Support {
-    size: (usize, usize),
-    reach: Reach,
-    /// Damaged pixels, where there are any.
-    damage: Option<Frame<Status>>,
+    status: Frame<Status>,
 }
 
 impl Support {
     /// Examines every sample of every frame. `spread`: radius of a smoothing to come, px.
     pub fn new<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&Mask>, reach: Reach, spread: usize) -> Self {
         let size = frames[0].size();
-        let finite = frames.iter().all(|f| all_finite(f));
-        let masked = mask.filter(|m| m.data().iter().any(|used| !used));
-        if finite && masked.is_none() {
-            return Self { size, reach, damage: None };
-        }
+        let is_finite = |x: usize, y: usize| frames.iter().all(|f| f.get(x, y).finite());
+        let broken = !frames.iter().all(|f| all_finite(f));
+        let broken = broken.then(|| MaskCounts::new(&Frame::from_fn(size.0, size.1, is_finite)));
+        let masked = mask.filter(|m| m.data().iter().any(|used| !used)).map(MaskCounts::new);
         let [left, right, up, down] = [reach.left, reach.right, reach.up, reach.down].map(|side| side + spread);
         let wide = Reach { left, right, up, down };
-        let is_finite = |x: usize, y: usize| frames.iter().all(|f| f.get(x, y).finite());
-        let broken = (!finite).then(|| MaskCounts::new(&Frame::from_fn(size.0, size.1, is_finite)));
-        let masked = masked.map(MaskCounts::new);
-        let damage = Frame::from_fn(size.0, size.1, |x, y| {
-            if masked.as_ref().is_some_and(|counts| counts.touches((x, y), wide)) {
+        let status = Frame::from_fn(size.0, size.1, |x, y| {
+            let touches = |counts: &Option<MaskCounts>| counts.as_ref().is_some_and(|c| c.touches((x, y), wide));
+            if !reach.fits((x, y), size) {
+                Status::Border
+            } else if touches(&masked) {
                 Status::Masked
-            } else if broken.as_ref().is_some_and(|counts| counts.touches((x, y), wide)) {
+            } else if touches(&broken) {
                 Status::NonFinite
             } else {
                 Status::Ok
             }
         });
-        Self { size, reach, damage: Some(damage) }
+        Self { status }
     }
 
-    /// No pixel is damaged: the usable pixels are a rectangle.
-    pub fn is_whole(&self) -> bool {
-        self.damage.is_none()
-    }
-
-    /// Why pixel `(x, y)` has no equations of its own; `Ok` where it has.
+    /// Status of a pixel.
     pub fn status(&self, x: usize, y: usize) -> Status {
-        if self.reach.fits((x, y), self.size) {
-            self.damage.as_ref().map_or(Status::Ok, |d| d.get(x, y))
-        } else {
-            Status::Border
-        }
+        self.status.get(x, y)
     }
 
     /// Why a pixel with equations of its own has too few neighbours with theirs.
     pub fn lack(&self, x: usize, y: usize, radius: usize) -> Status {
-        let Some(damage) = &self.damage else { return Status::Border };
-        let (w, h) = self.size;
-        let rows = y.saturating_sub(radius)..(y + radius + 1).min(h);
+        let (w, h) = self.status.size();
         let columns = x.saturating_sub(radius)..(x + radius + 1).min(w);
-        let any = |s: Status| rows.clone().any(|y| damage.row(y)[columns.clone()].contains(&s));
-        if any(Status::Masked) {
-            Status::Masked
-        } else if any(Status::NonFinite) {
-            Status::NonFinite
-        } else {
-            Status::Border
-        }
-    }
-
-    /// Columns and rows inside which a neighbourhood lies in the frame.
-    pub fn inside(&self) -> (std::ops::Range<usize>, std::ops::Range<usize>) {
-        self.reach.inside(self.size)
+        let has = |s: &Status| {
+            let mut rows = y.saturating_sub(radius)..(y + radius + 1).min(h);
+            rows.any(|y| self.status.row(y)[columns.clone()].contains(s))
+        };
+        [Status::Masked, Status::NonFinite].into_iter().find(has).unwrap_or(Status::Border)
     }
 
     /// Writes 1 for usable and 0 for other pixels of row `y` from column `first` on; both may lie outside the
     /// frame.
     pub fn weights<T: Real>(&self, first: isize, y: isize, out: &mut [T]) {
-        out.fill(T::default());
-        let (columns, rows) = self.inside();
-        let Some(y) = usize::try_from(y).ok().filter(|y| rows.contains(y)) else { return };
-        let from = (columns.start as isize - first).clamp(0, out.len() as isize) as usize;
-        let to = (columns.end as isize - first).clamp(from as isize, out.len() as isize) as usize;
-        out[from..to].fill(T::from_f64(1.0));
-        if let Some(damage) = &self.damage {
-            let row = damage.row(y);
-            for (i, weight) in out.iter_mut().enumerate().take(to).skip(from) {
-                if row[(first + i as isize) as usize] != Status::Ok {
-                    *weight = T::default();
-                }
-            }
+        let row = usize::try_from(y).ok().filter(|y| *y < self.status.height()).map_or(&[][..], |y| self.status.row(y));
+        for (weight, x) in out.iter_mut().zip(first..) {
+            let status = usize::try_from(x).ok().and_then(|x| row.get(x));
+            *weight = T::from_f64(f64::from(status == Some(&Status::Ok)));
         }
     }
 }
@@ -109,7 +77,7 @@ mod tests {
         let reach = Reach { left: 1, right: 1, up: 1, down: 1 };
         let mut frame = Frame::filled(9, 8, 1.0f32);
         let whole = Support::new(&[&frame], None, reach, 0);
-        assert!(whole.is_whole() && whole.status(0, 3) == Status::Border && whole.status(1, 1) == Status::Ok);
+        assert!(whole.status(0, 3) == Status::Border && whole.status(1, 1) == Status::Ok);
         frame.data_mut()[4 * 9 + 4] = f32::INFINITY;
         let mut mask = Frame::filled(9, 8, true);
         mask.data_mut()[2 * 9 + 7] = false;

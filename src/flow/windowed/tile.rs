@@ -1,23 +1,31 @@
-//! From frames to moments, one tile at a time, small enough for the processor's caches.
+//! From frames to planes of products, one tile at a time, small enough for the processor's caches.
 
 use super::combine::Combination;
-use super::rows::{Jets, Plan, moments, products};
+use super::equations::{Jets, products};
+use super::plan::Plan;
 use super::support::Support;
-use super::window::Window;
-use crate::flow::moment_filter::{CHUNK, filter};
+use crate::flow::moment_filter::CHUNK;
 use crate::jet::{JetRows, Reach};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::Frame;
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Columns of a tile.
 pub(super) const TILE_COLUMNS: usize = 128;
 /// Rows whose moments are held at a time: while they are summed, the products they share stay in the nearest
 /// cache.
 pub(super) const GROUP_ROWS: usize = 8;
+/// Most rows of one parallel task; fixed, so that threads cannot change a result.
+const TASK_ROWS: usize = 64;
+
+/// Writes the motion from a pixel on along its row: six rows of equal length, in px and frames.
+pub(super) type MotionRow<'a, T> = dyn Fn(isize, isize, &mut [T]) + Sync + 'a;
 
 /// The images and how to take their jets.
+#[derive(Clone)]
 pub(super) struct Source<'a, T> {
-    /// Frames, oldest first, smoothed already where that was requested.
+    /// Frames, oldest first, smoothed already where that is an option.
     pub frames: Vec<&'a Frame<T>>,
     /// How they are combined.
     pub combination: Combination,
@@ -27,8 +35,12 @@ pub(super) struct Source<'a, T> {
     pub reach: Reach,
     /// Usable pixels.
     pub support: &'a Support,
-    /// Whether the second time difference is needed.
-    pub second: bool,
+    /// Equations a pixel: 1, 3, 6 or 12.
+    pub rows: usize,
+    /// Motion of each pixel that the frames lack, to be put back.
+    pub carried: Option<&'a MotionRow<'a, T>>,
+    /// Instruction set.
+    pub level: Level,
 }
 
 /// Length of a buffer row that holds at least `n` samples, without a tail.
@@ -36,98 +48,130 @@ pub(super) const fn padded(n: usize) -> usize {
     n.div_ceil(CHUNK) * CHUNK
 }
 
-/// Jets of the three combinations over a rectangle, row by row.
+/// Planes over columns of evenly spaced image rows.
+pub(super) struct Grid<T> {
+    pub rows: Vec<usize>,
+    pub columns: Range<usize>,
+    pub planes: usize,
+    /// Row after row, of each row its planes one after the other.
+    values: Vec<T>,
+}
+
+impl<T: SimdReal> Grid<T> {
+    /// NaN everywhere; at least one row and column.
+    pub fn new(rows: Vec<usize>, columns: Range<usize>, planes: usize) -> Self {
+        let values = vec![T::nan(); planes * rows.len() * columns.len()];
+        Self { rows, columns, planes, values }
+    }
+
+    fn spacing(&self) -> usize {
+        self.rows.get(1).map_or(1, |second| second - self.rows[0])
+    }
+
+    /// Rows of one parallel task.
+    pub fn task_rows(&self) -> usize {
+        (TASK_ROWS / self.spacing()).max(1)
+    }
+
+    /// Rows and values of each parallel task.
+    pub fn tasks(&mut self) -> impl IndexedParallelIterator<Item = (&[usize], &mut [T])> {
+        let task = self.task_rows();
+        self.rows.par_chunks(task).zip(self.values.par_chunks_mut(task * self.planes * self.columns.len()))
+    }
+
+    /// Place of the image row `y` among the rows.
+    pub fn place(&self, y: usize) -> Option<usize> {
+        let j = y.checked_sub(self.rows[0])? / self.spacing();
+        (self.rows.get(j) == Some(&y)).then_some(j)
+    }
+
+    /// Row `j` of a plane.
+    pub fn row(&self, plane: usize, j: usize) -> &[T] {
+        let width = self.columns.len();
+        &self.values[(j * self.planes + plane) * width..][..width]
+    }
+}
+
+/// Jets of the combinations over a rectangle, row by row.
+#[derive(Default)]
 pub(super) struct JetTile<T> {
     images: Vec<T>,
     scratch: Vec<T>,
     rows: Vec<T>,
     weight: Vec<T>,
-    width: usize,
     image_width: usize,
+    image_size: usize,
     corner: (isize, isize),
     left: usize,
     up: usize,
-    height: usize,
+    /// Six rows of the motion to be put back, or none.
+    carried: Vec<T>,
 }
 
 impl<T: SimdReal> JetTile<T> {
-    pub fn new() -> Self {
-        Self {
-            images: Vec::new(),
-            scratch: Vec::new(),
-            rows: Vec::new(),
-            weight: Vec::new(),
-            width: 0,
-            image_width: 0,
-            corner: (0, 0),
-            left: 0,
-            up: 0,
-            height: 0,
-        }
-    }
-
     /// Prepares jets of `height` rows of `width` pixels (a multiple of [`CHUNK`]) from pixel `corner` on,
     /// which may lie outside the frame.
-    #[inline(always)]
     pub fn load(&mut self, source: &Source<'_, T>, corner: (isize, isize), width: usize, height: usize) {
         let Reach { left, right, up, down } = source.reach;
-        self.image_width = width + left + right;
-        (self.width, self.height, self.corner, self.left, self.up) = (width, height, corner, left, up);
-        let n = self.image_width * (height + up + down);
-        self.images.resize(3 * n, T::default());
+        (self.corner, self.left, self.up, self.image_width) = (corner, left, up, width + left + right);
+        self.image_size = self.image_width * (height + up + down);
+        let count = if source.rows == 12 { 3 } else { 2 };
+        self.images.resize(count * self.image_size, T::default());
         self.scratch.resize(source.jets.scratch_len(self.image_width), T::default());
         self.rows.resize(18 * self.image_width, T::default());
         self.weight.resize(width, T::default());
-        let (coefficient, rest) = self.images.split_at_mut(n);
-        let (first, second) = rest.split_at_mut(n);
         let start = (corner.0 - left as isize, corner.1 - up as isize);
-        source.combination.apply(&source.frames, start, self.image_width, source.second, [coefficient, first, second]);
+        let images = self.images.chunks_exact_mut(self.image_size);
+        source.combination.apply(&source.frames, start, self.image_width, images);
     }
 
     /// Computes the jets and weights of row `r` of the rectangle.
-    pub fn row(&mut self, level: Level, source: &Source<'_, T>, r: usize) {
-        let images = self.images.len() / 3;
-        let w = self.image_width;
-        for (k, rows) in self.rows.chunks_exact_mut(6 * w).enumerate() {
-            if k < 2 || source.second {
-                let image = &self.images[k * images..(k + 1) * images];
-                let (jets, row, scratch) = (&source.jets, r + self.up, &mut self.scratch[..]);
-                dispatch(level, JetRow { jets, image, width: w, row, scratch, rows });
-            }
+    pub fn row(&mut self, source: &Source<'_, T>, r: usize) {
+        let width = self.image_width;
+        let images = self.images.chunks_exact(self.image_size);
+        for (rows, image) in self.rows.chunks_exact_mut(6 * width).zip(images) {
+            let (jets, row, scratch) = (&source.jets, r + self.up, &mut self.scratch[..]);
+            dispatch(source.level, JetRow { jets, image, width, row, scratch, rows });
         }
         source.support.weights(self.corner.0, self.corner.1 + r as isize, &mut self.weight);
+        if let Some(motion) = source.carried {
+            self.carried.resize(6 * self.weight.len(), T::default());
+            motion(self.corner.0, self.corner.1 + r as isize, &mut self.carried);
+        } else {
+            self.carried.clear();
+        }
     }
 
-    /// 1 for the usable pixels of the last row, 0 for others.
-    pub fn weight(&self) -> &[T] {
-        &self.weight
-    }
-
-    /// Jets of the last row at column `c`; zero where the pixel is not usable.
+    /// The motion to be put back at column `c` of the last row.
     #[inline(always)]
-    pub fn jets<V: Lanes<Scalar = T>>(&self, c: usize, second: bool) -> Jets<V> {
-        let usable = V::zero().lt(V::load(&self.weight[c..]));
-        let load = |k: usize| V::select(usable, V::load(&self.rows[k * self.image_width + self.left + c..]), V::zero());
-        let six = |k: usize| [load(k), load(k + 1), load(k + 2), load(k + 3), load(k + 4), load(k + 5)];
-        Jets { coefficient: six(0), first: six(6), second: if second { six(12) } else { [V::zero(); 6] } }
+    fn carried<V: Lanes<Scalar = T>>(&self, c: usize) -> Option<[V; 6]> {
+        let width = self.weight.len();
+        (!self.carried.is_empty()).then(|| std::array::from_fn(|k| V::load(&self.carried[k * width + c..])))
+    }
+
+    /// Jets of the last row at column `c`, zero where the pixel is not usable; 1 where it is.
+    #[inline(always)]
+    pub fn jets<V: Lanes<Scalar = T>>(&self, c: usize, second: bool) -> (Jets<V>, V) {
+        let weight = V::load(&self.weight[c..]);
+        let usable = V::zero().lt(weight);
+        let mut jets = [[V::zero(); 6]; 3];
+        for (k, value) in jets[..if second { 3 } else { 2 }].iter_mut().flatten().enumerate() {
+            *value = V::select(usable, V::load(&self.rows[k * self.image_width + self.left + c..]), V::zero());
+        }
+        let [coefficient, first, second] = jets;
+        (Jets { coefficient, first, second }, weight)
     }
 }
 
-/// Product planes of a tile with a margin of the window's radius.
+/// Planes of a tile with a margin, each of `height` rows of `width` samples.
+#[derive(Default)]
 pub(super) struct Planes<T> {
-    /// `count` planes of `height` rows of `width` samples.
     pub data: Vec<T>,
-    /// Samples in a row.
     pub width: usize,
-    /// Rows.
     pub height: usize,
 }
 
 impl<T: SimdReal> Planes<T> {
-    pub fn new() -> Self {
-        Self { data: Vec::new(), width: 0, height: 0 }
-    }
-
     pub fn resize(&mut self, count: usize, width: usize, height: usize) {
         (self.width, self.height) = (width, height);
         self.data.resize(count * width * height, T::default());
@@ -136,8 +180,7 @@ impl<T: SimdReal> Planes<T> {
     /// Plane `p`.
     #[inline(always)]
     pub fn plane(&self, p: usize) -> &[T] {
-        let n = self.width * self.height;
-        &self.data[p * n..(p + 1) * n]
+        &self.data[self.at(p, 0, 0)..self.at(p + 1, 0, 0)]
     }
 
     /// Place of the sample at row `r`, column `c` of plane `p`.
@@ -146,36 +189,19 @@ impl<T: SimdReal> Planes<T> {
         (p * self.height + r) * self.width + c
     }
 
-    /// Fills the product planes of `rows` equations (1, 3, 6 or 12) a pixel from the jets, and after them the
-    /// plane of weights where `weights` says so.
-    pub fn fill(
-        &mut self,
-        (level, rows): (Level, usize),
-        source: &Source<'_, T>,
-        jets: &mut JetTile<T>,
-        scale: T,
-        weights: bool,
-    ) {
-        let count = Plan::new(rows).planes();
-        let n = self.width * self.height;
-        for r in 0..self.height {
-            jets.row(level, source, r);
-            match rows {
-                1 => dispatch(level, Products::<T, 1> { planes: self, jets, row: r, scale }),
-                3 => dispatch(level, Products::<T, 3> { planes: self, jets, row: r, scale }),
-                6 => dispatch(level, Products::<T, 6> { planes: self, jets, row: r, scale }),
-                _ => dispatch(level, Products::<T, 12> { planes: self, jets, row: r, scale }),
-            }
-            if weights {
-                let at = count * n + r * self.width;
-                self.data[at..at + self.width].copy_from_slice(jets.weight());
+    /// Fills the planes of the equations from the jets.
+    pub fn fill(&mut self, source: &Source<'_, T>, jets: &mut JetTile<T>, scale: T) {
+        for row in 0..self.height {
+            jets.row(source, row);
+            match source.rows {
+                1 => dispatch(source.level, Products::<T, 1> { planes: self, jets, row, scale }),
+                3 => dispatch(source.level, Products::<T, 3> { planes: self, jets, row, scale }),
+                6 => dispatch(source.level, Products::<T, 6> { planes: self, jets, row, scale }),
+                _ => dispatch(source.level, Products::<T, 12> { planes: self, jets, row, scale }),
             }
         }
     }
 }
-
-// Each step is a kernel of its own, and what does not depend on the equations is not compiled again for each
-// set of them.
 
 /// Jets of one row.
 struct JetRow<'a, T> {
@@ -196,7 +222,7 @@ impl<T: SimdReal> Kernel<T> for JetRow<'_, T> {
     }
 }
 
-/// Product planes of one row.
+/// Planes of the equations in one row.
 struct Products<'a, T, const ROWS: usize> {
     planes: &'a mut Planes<T>,
     jets: &'a JetTile<T>,
@@ -210,92 +236,17 @@ impl<T: SimdReal, const ROWS: usize> Kernel<T> for Products<'_, T, ROWS> {
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
         let Planes { data, width, height } = self.planes;
-        let (count, n, scale) = (Plan::new(ROWS).planes(), *width * *height, V::splat(self.scale));
+        let (count, n, scale) = (Plan::of_rows(ROWS).planes(), *width * *height, V::splat(self.scale));
         let mut c = 0;
         while c < *width {
-            let values = products::<V, ROWS>(&self.jets.jets::<V>(c, ROWS == 12), scale);
+            let (jets, usable) = self.jets.jets::<V>(c, ROWS == 12);
+            let carried = self.jets.carried::<V>(c);
+            let values = products::<V, ROWS>(&jets, (usable, scale), carried.as_ref());
             let at = self.row * *width + c;
             for (p, value) in values.into_iter().enumerate().take(count) {
                 value.store(&mut data[p * n + at..]);
             }
             c += V::LANES;
-        }
-    }
-}
-
-/// Moments of a group of rows: moment `k` of row `j` is `data[(k * GROUP_ROWS + j) * TILE_COLUMNS ..][..
-/// TILE_COLUMNS]`.
-pub(super) struct Moments<T> {
-    pub data: Vec<T>,
-    column_sums: [Vec<T>; 3],
-}
-
-impl<T: SimdReal> Moments<T> {
-    pub fn new() -> Self {
-        Self { data: Vec::new(), column_sums: [const { Vec::new() }; 3] }
-    }
-
-    /// Sums plane `p` of `planes`, up to the power `order`, into the moments from `base` on, around rows
-    /// `centres` (at most [`GROUP_ROWS`]) of the planes and columns `radius ..`.
-    pub fn sum(
-        &mut self,
-        level: Level,
-        window: &Window<T>,
-        planes: &Planes<T>,
-        place: (usize, usize, usize),
-        centres: &[usize],
-    ) {
-        dispatch(level, Sum { moments: self, window, planes, place, centres });
-    }
-}
-
-/// The sums of one plane.
-struct Sum<'a, T> {
-    moments: &'a mut Moments<T>,
-    window: &'a Window<T>,
-    planes: &'a Planes<T>,
-    place: (usize, usize, usize),
-    centres: &'a [usize],
-}
-
-impl<T: SimdReal> Kernel<T> for Sum<'_, T> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<V: Lanes<Scalar = T>>(self) {
-        let Self { moments: sums, window, planes, place: (p, order, base), centres } = self;
-        let (width, radius) = (planes.width, window.radius());
-        let taps = &window.taps[..];
-        let size = GROUP_ROWS * TILE_COLUMNS;
-        sums.data.resize(sums.data.len().max((base + moments(order)) * size), T::default());
-        for v in &mut sums.column_sums {
-            v.resize(v.len().max(width), T::default());
-        }
-        let [v0, v1, v2] = &mut sums.column_sums;
-        for (j, &row) in centres.iter().enumerate() {
-            let plane = planes.plane(p);
-            let centre = row * width;
-            let mut places = sums.data[base * size..(base + moments(order)) * size].chunks_exact_mut(size);
-            let mut next = || &mut places.next().unwrap_or_default()[j * TILE_COLUMNS..(j + 1) * TILE_COLUMNS];
-            match order {
-                0 => {
-                    filter::<V, 1>(plane, centre, width, width, taps, [v0]);
-                    filter::<V, 1>(v0, radius, 1, TILE_COLUMNS, taps, [next()]);
-                }
-                1 => {
-                    filter::<V, 2>(plane, centre, width, width, taps, [v0, v1]);
-                    let (one, x, y) = (next(), next(), next());
-                    filter::<V, 2>(v0, radius, 1, TILE_COLUMNS, taps, [one, x]);
-                    filter::<V, 1>(v1, radius, 1, TILE_COLUMNS, taps, [y]);
-                }
-                _ => {
-                    filter::<V, 3>(plane, centre, width, width, taps, [v0, v1, v2]);
-                    let (one, x, y, xx, xy, yy) = (next(), next(), next(), next(), next(), next());
-                    filter::<V, 3>(v0, radius, 1, TILE_COLUMNS, taps, [one, x, xx]);
-                    filter::<V, 2>(v1, radius, 1, TILE_COLUMNS, taps, [y, xy]);
-                    filter::<V, 1>(v2, radius, 1, TILE_COLUMNS, taps, [yy]);
-                }
-            }
         }
     }
 }
