@@ -44,14 +44,6 @@ impl Clock {
 pub(super) const MAX_REACH: usize = 64;
 
 #[cfg(test)]
-impl Clock {
-    /// At a whole step, the last one being the one before it.
-    pub fn at(step: usize) -> Self {
-        Self { now: step as f64, gap: 1.0, step_time: 1.0 }
-    }
-}
-
-#[cfg(test)]
 mod tests {
     use super::*;
 
