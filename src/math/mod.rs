@@ -1,6 +1,7 @@
 //! Small numerical parts that know nothing of images.
 
 pub mod dense;
+pub mod kd_tree;
 pub mod random;
 mod real;
 pub mod special;

@@ -10,7 +10,7 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::model::result::{Alternative, CommonEffect, Likelihood, Moved, Status, UNKNOWN, axes, nested};
 use crate::motion3d::model::rows::Matrix5;
-use crate::motion3d::robust::{Consensus, EstimatedMotion, weighted_by_posterior};
+use crate::motion3d::robust::{Consensus, weighted_by_posterior};
 use crate::motion3d::solver::covariance::{PluginCovariances, direction_deviation, inverse};
 use crate::motion3d::solver::efficient::{Efficient, nonlinearity_covariance};
 use crate::motion3d::solver::likelihood::Candidate;
@@ -99,11 +99,10 @@ impl Solution {
     /// weights, which may be wrong, the motion stays.
     pub fn weighted_by_posterior(&mut self, all: &Observations, known: &Consensus, given: bool) {
         let Some(covariance) = self.covariance else { return };
-        let from = EstimatedMotion { motion: self.motion, tangent: self.tangent, covariance };
+        let from = (&self.motion, &self.tangent, &covariance);
         let smooth = self.smooth.as_deref().filter(|_| !given);
-        let Some(refit) = weighted_by_posterior(all, known, &from, smooth, !given) else { return };
-        (self.motion, self.tangent) = (refit.motion, refit.tangent);
-        self.covariance = Some(refit.covariance);
+        let Some((motion, tangent, grown)) = weighted_by_posterior(all, known, from, smooth, !given) else { return };
+        (self.motion, self.tangent, self.covariance) = (motion, tangent, Some(grown));
     }
 
     /// Takes errors into the covariance that go together over a length, in the unit of the points.

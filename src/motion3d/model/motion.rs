@@ -51,6 +51,12 @@ impl Motion {
         Self::of(&u.normalize(), &(self.w() + Vector3::new(step[2], step[3], step[4])))
     }
 
+    /// `(psi, w)` from `other`, in the axes `tangent` of its translation, to this motion: to first order.
+    pub(crate) fn offset(&self, other: &Self, tangent: &Matrix2x3<f64>) -> Vector5 {
+        let (along, turn) = (tangent * (self.u() - other.u()), self.w() - other.w());
+        Vector5::new(along.x, along.y, turn.x, turn.y, turn.z)
+    }
+
     /// Angle between the translation directions, rad, 0 to pi.
     pub fn angle_to(&self, other: &Self) -> f64 {
         let (a, b) = (self.u(), other.u());

@@ -155,6 +155,16 @@ impl Observations {
         }
     }
 
+    /// Every point times the root of its weight.
+    pub fn weighted(&self, weight: impl Fn(usize) -> f64) -> Self {
+        let (mut out, n, stride) = (self.clone(), self.n, self.stride);
+        let roots: Vec<f64> = (0..n).map(|k| weight(k).sqrt()).collect();
+        for plane in out.planes.chunks_exact_mut(stride.max(1)) {
+            plane.iter_mut().zip(&roots).for_each(|(value, root)| *value *= root);
+        }
+        out
+    }
+
     /// How many times as large the noise of point `k` is along one axis as along the other, and the axis with
     /// little of it.
     fn stretch(&self, k: usize) -> (f64, Vector2<f64>) {

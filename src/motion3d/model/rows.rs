@@ -35,6 +35,15 @@ pub(crate) fn tangents(direction: &Vector3<f64>) -> Matrix2x3<f64> {
     Matrix2x3::from_rows(&[first.transpose(), second.transpose()])
 }
 
+/// Tangent axes of another direction `u`, each on the side where it was.
+pub(crate) fn carried(axes: &Matrix2x3<f64>, u: &Vector3<f64>) -> Matrix2x3<f64> {
+    let [first, second] = [0, 1].map(|row| axes.row(row).transpose());
+    let first = (first - u * u.dot(&first)).normalize();
+    let across = u.cross(&first);
+    let second = across * second.dot(&across).signum();
+    Matrix2x3::from_rows(&[first.transpose(), second.transpose()])
+}
+
 impl Rows {
     /// On the plane at distance 1, axes x and y.
     pub fn plane([x, y]: [f64; 2]) -> Self {

@@ -10,7 +10,7 @@ use crate::math::quantile;
 use crate::math::random::CounterRng;
 use crate::motion3d::diagnostics::confidence_region::PLAUSIBLE;
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
+use crate::motion3d::model::rows::{Matrix5, tangents};
 use crate::motion3d::solver::covariance::{inverse, plugged};
 use crate::motion3d::solver::efficient::{FARTHEST, ROUNDS};
 use nalgebra::{Matrix3, Vector3, Vector6};
@@ -137,8 +137,6 @@ fn distance(system: &System, truth: &Motion, weighted: bool) -> f64 {
         Some((motion, inverse(&system.equations(&motion, &tangents(&motion.u()), Some(&surfaces)).h)?))
     };
     let Some((found, covariance)) = found() else { return f64::INFINITY };
-    let along = tangents(&found.u()) * truth.u();
-    let turn = truth.w() - found.w();
-    let off = Vector5::new(along.x, along.y, turn.x, turn.y, turn.z);
+    let off = truth.offset(&found, &tangents(&found.u()));
     covariance.cholesky().map_or(f64::INFINITY, |factor| off.dot(&factor.solve(&off)))
 }

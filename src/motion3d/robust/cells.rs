@@ -2,9 +2,9 @@
 //! are connected: their points that fit the scene's motion by chance pull it towards theirs.
 
 use super::{Consensus, MIN_POINTS, STOPPING, inliers_of};
+use crate::math::kd_tree::{Neighbours, Tree};
 use crate::math::median;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::solver::neighbours::{Neighbours, Tree};
 use crate::motion3d::solver::refine::{MANY, refine};
 use std::ops::Range;
 

@@ -39,7 +39,7 @@ use cells::Cells;
 use competing_motions::{among_many_outliers, competing_motions, second};
 use depth_consistency::DepthConsistency;
 pub(crate) use leverage::has_high_leverage;
-pub(crate) use mixture::{EstimatedMotion, weighted_by_posterior};
+pub(crate) use mixture::weighted_by_posterior;
 pub(crate) use noise::larger;
 pub(crate) use noise::one_noise;
 use outlier_posterior::OutlierPosterior;

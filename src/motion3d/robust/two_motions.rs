@@ -6,12 +6,12 @@
 use super::search::GraduatedWeights;
 use super::{APART, CompetingMotion, INLIER, MIN_POINTS, cheaper_sign, truncated};
 use crate::math::chi2_deviation;
+use crate::math::kd_tree::{Neighbours, Tree};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{depths, slopes};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
-use crate::motion3d::solver::neighbours::{Neighbours, Tree};
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use nalgebra::SymmetricEigen;
 use std::ops::Range;

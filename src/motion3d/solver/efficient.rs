@@ -8,7 +8,7 @@ use crate::motion3d::kernels::{Bilinear, depths, information, slope};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
-use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen, Vector2};
+use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen};
 
 /// Times that depths are smoothed and the equation is solved.
 pub(crate) const ROUNDS: usize = 3;
@@ -180,8 +180,8 @@ fn sandwich(
     if share.is_some() { covariance.or(Some(plain)) } else { covariance.filter(|own| own.cholesky().is_some()) }
 }
 
-/// The root of the equation whose weights are frozen at `start`.
-fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> Option<Motion> {
+/// The root of the equation whose weights, with the depths `nu`, are frozen at `start`.
+pub(crate) fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> Option<Motion> {
     let tangent = tangents(&start.u());
     let spread = damping(observations, start, &tangent, nu)?;
     let equation = Bilinear::new(observations, start, &tangent, nu, spread);
@@ -217,9 +217,7 @@ pub(crate) fn beyond_theory(observations: &Observations, minimum: &Minimum, plug
 /// Mean square error of the minimum as the better solution has it, `C + d d^t` with their difference `d`, in
 /// the minimum's axes.
 pub(crate) fn nonlinearity_covariance(minimum: &Minimum, better: &Efficient) -> Matrix5 {
-    let along: Vector2<f64> = minimum.tangent * better.motion.u();
-    let turn = better.motion.w() - minimum.motion.w();
-    let apart = Vector5::from_column_slice(&[along.x, along.y, turn.x, turn.y, turn.z]);
+    let apart = better.motion.offset(&minimum.motion, &minimum.tangent);
     let axes: Matrix2<f64> = minimum.tangent * better.tangent.transpose();
     let mut into = Matrix5::identity();
     into.fixed_view_mut::<2, 2>(0, 0).copy_from(&axes);

@@ -1,7 +1,7 @@
 //! Estimates the motion of points that all have the same one, in this order.
 //!
-//! `starts` searches the half sphere of directions and `refine` descends from there. `neighbours`,
-//! `regression` and `smoothing` predict inverse depths from those nearby; `efficient` solves the estimating
+//! `starts` searches the half sphere of directions and `refine` descends from there. `regression` and
+//! `smoothing` predict inverse depths from those nearby; `efficient` solves the estimating
 //! equation with these in its weights; `likelihood` chooses among minima and solutions. `covariance` and
 //! `profile_likelihood` compute how well the direction is known. `finite_rotation` repeats this with the
 //! rotation taken out of the displacements.
@@ -10,7 +10,6 @@ pub(crate) mod covariance;
 pub(crate) mod efficient;
 pub(crate) mod finite_rotation;
 pub(crate) mod likelihood;
-pub(crate) mod neighbours;
 pub(crate) mod profile_likelihood;
 pub(crate) mod refine;
 pub(crate) mod regression;

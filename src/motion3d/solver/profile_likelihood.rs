@@ -12,7 +12,7 @@ use super::covariance::{damping, direction_block, direction_deviation, inverse};
 use crate::motion3d::kernels::{Bilinear, information};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::{Matrix5, Vector5};
+use crate::motion3d::model::rows::{Matrix5, Vector5, carried};
 use nalgebra::{Matrix2x3, Matrix4, SMatrix, SymmetricEigen, Vector2, Vector3};
 
 /// Standard deviations of the direction, as shares of the field, below which the theory is linear enough;
@@ -229,15 +229,6 @@ impl ProfileLikelihood<'_> {
         let score = value[0] * value[0] * inverse(&squares)?[(0, 0)];
         (score > 0.0 && score.is_finite()).then_some((End { psi, rest, covariance: others(&squares)? }, score))
     }
-}
-
-/// The axes where the direction is `u`, each on the side where it was.
-fn carried(axes: &Matrix2x3<f64>, u: &Vector3<f64>) -> Matrix2x3<f64> {
-    let [first, second] = [0, 1].map(|row| axes.row(row).transpose());
-    let first = (first - u * u.dot(&first)).normalize();
-    let across = u.cross(&first);
-    let second = across * second.dot(&across).signum();
-    Matrix2x3::from_rows(&[first.transpose(), second.transpose()])
 }
 
 /// The covariance of the others where the first unknown is given.

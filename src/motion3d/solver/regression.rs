@@ -1,6 +1,6 @@
 //! Depths predicted from neighbours: leave-one-out local-linear regression, a point in every lane.
 
-use super::neighbours::Neighbours;
+use crate::math::kd_tree::Neighbours;
 use crate::motion3d::model::rows::tangents;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use nalgebra::{Matrix2x3, Vector3};
@@ -179,8 +179,8 @@ pub(crate) fn regress(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::kd_tree::Tree;
     use crate::math::random::CounterRng;
-    use crate::motion3d::solver::neighbours::Tree;
     use nalgebra::{DMatrix, DVector};
 
     /// The same by matrices.

@@ -1,9 +1,9 @@
 //! Which depths weigh the equations: predicted by what suits the scene best, then drawn to the prediction as
 //! far as that can be trusted.
 
-use super::neighbours::{Neighbours, SIZES, Tree};
 use super::regression::{Prediction, Site, regress};
 use super::starts::sample;
+use crate::math::kd_tree::{Neighbours, SIZES, Tree};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::Depths;
 use crate::motion3d::model::observations::Observations;

@@ -1,6 +1,6 @@
-//! The nearest points of every point, by a k-d tree. Points are named by their place in the tree, where
-//! neighbours are near each other in memory too. Which of several points at the same distance are kept
-//! depends on the points alone.
+//! The nearest points of every point, by a k-d tree (J. Bentley 1975). Points are named by their place in the
+//! tree, where neighbours are near each other in memory too. Which of several points at the same distance are
+//! kept depends on the points alone.
 
 use rayon::prelude::*;
 
@@ -12,7 +12,7 @@ const BAND: usize = 256;
 
 /// Numbers of neighbours that are kept apart: the first 8 in a list are the 8 nearest, the first 16 the 16
 /// nearest, ...
-pub(crate) const SIZES: [usize; 4] = [8, 16, 32, 64];
+pub const SIZES: [usize; 4] = [8, 16, 32, 64];
 
 #[derive(Debug, Clone, Copy)]
 struct Node {
@@ -25,7 +25,7 @@ struct Node {
 
 /// A tree over points in space.
 #[derive(Debug, Clone)]
-pub(crate) struct Tree {
+pub struct Tree {
     nodes: Vec<Node>,
     points: Vec<[f64; 3]>,
     order: Vec<u32>,
@@ -33,7 +33,8 @@ pub(crate) struct Tree {
 
 /// The nearest points of some points, `k` each, by their places in the tree.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Neighbours {
+pub struct Neighbours {
+    /// How many of each.
     pub k: usize,
     places: Vec<u32>,
 }
@@ -79,6 +80,7 @@ impl Tree {
     pub fn order(&self) -> &[u32] {
         &self.order
     }
+
     /// The points by place.
     pub fn points(&self) -> &[[f64; 3]] {
         &self.points
