@@ -103,7 +103,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     };
     let inner = scaled.observations.subset(&kept.inner);
     let found = Task { whitening: &whitening, options, known: Some(&kept), rng }.on(&mut scaled, inner);
-    doubted(with_all_inliers(found, &scaled.observations, &kept), &scaled.observations, &kept)
+    doubted(with_all_inliers(found, &scaled.observations, &kept), &scaled.observations)
 }
 
 /// The inliers of one motion, judged by their own errors.

@@ -209,20 +209,9 @@ pub(crate) fn with_all_inliers(mut found: MotionEstimate, all: &Observations, ke
     found
 }
 
-/// Too few points to separate outliers from large noise, or from those that decide, make a motion doubtful
-/// that nothing worse is said against. That there is none, or too little of one, is said of the same doubtful
-/// choice of points and no surer; other statuses say more.
-///
-/// A rotation alone is not doubted if it leaves one noise of all points, which is the shorter description of
-/// them.
-pub(crate) fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
-    let doubtful = kept.doubtful;
-    let few = match found.status {
-        Status::Ok => doubtful || robust::has_high_leverage(all, &found),
-        Status::RotationOnly => doubtful && !(kept.single_noise && robust::one_noise(&found.residuals)),
-        Status::LowSnr => doubtful,
-        _ => false,
-    };
+/// Points that decide alone make a motion doubtful that nothing worse is said against.
+pub(crate) fn doubted(found: MotionEstimate, all: &Observations) -> MotionEstimate {
+    let few = found.status == Status::Ok && robust::has_high_leverage(all, &found);
     if few { MotionEstimate { status: Status::FewPoints, ..found } } else { found }
 }
 

@@ -41,7 +41,6 @@ use depth_consistency::DepthConsistency;
 pub(crate) use leverage::has_high_leverage;
 pub(crate) use mixture::weighted_by_posterior;
 pub(crate) use noise::larger;
-pub(crate) use noise::one_noise;
 use outlier_posterior::OutlierPosterior;
 use search::{GraduatedWeights, graduated};
 use std::borrow::Cow;
@@ -89,14 +88,8 @@ const UNKNOWNS: usize = 5;
 /// [`single_noise`].
 const SELECTED: usize = 100;
 
-/// By how much, in nats, outliers must shorten the description of the residuals to be accepted, and to be
-/// sure; the factor between both noises that makes a difference.
-const WORTH: f64 = 4.0;
+/// By how much, in nats, outliers must shorten the description of the residuals to be believed.
 const SURE: f64 = 10.0;
-const APART_NOISE: f64 = 1.5;
-
-/// By how much, in nats, outliers must lengthen that for there to be none.
-const LONGER: f64 = 1.0;
 
 /// Inliers below which a selection of them, whose noise is not known either, is not accepted.
 const FEWEST: usize = 20;
@@ -113,10 +106,6 @@ pub(crate) struct Consensus {
     /// Other motions with about as many inliers, and how much more each costs, in squared units of noise;
     /// the best first.
     pub competing: Vec<CompetingMotion>,
-    /// Whether the points are too few to separate outliers from large noise.
-    pub doubtful: bool,
-    /// Whether, of few points in unknown noise, one noise of all of them is the shorter description.
-    pub single_noise: bool,
     /// Whether so many outliers fit by chance that least squares on all inliers would follow them.
     pub many: bool,
     /// Probability that points are outliers that fit by chance; `None` if unknown.
@@ -132,8 +121,6 @@ impl Consensus {
             inliers,
             inner: Vec::new(),
             competing: Vec::new(),
-            doubtful: false,
-            single_noise: false,
             many: false,
             outliers: None,
             has_inlier_neighbours: None,
@@ -172,16 +159,11 @@ fn with_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -
     scaled.take(noise::FIRST_SHARE * scaled.observations.median_flow());
     let found = in_noise(whitening, scaled, true, rng)?;
     let Some(noise_std) = single_noise.map(|noise_std| noise_std / scaled.noise_std) else { return Some(found) };
-    let shorter = noise::shortening(&scaled.observations, &found, noise_std);
-    // If both noises are nearly equal, the choice does no harm.
-    let (n, k) = (scaled.observations.n, found.inliers.len());
-    let doubtful = k < n && noise_std > APART_NOISE && (shorter < SURE || k < FEWEST);
-    if shorter < WORTH {
+    if noise::shortening(&scaled.observations, &found, noise_std) < SURE {
         scaled.take(noise_std);
-        let found = in_noise(whitening, scaled, false, rng)?;
-        return Some(Consensus { doubtful: doubtful || found.doubtful, single_noise: shorter < -LONGER, ..found });
+        return in_noise(whitening, scaled, false, rng);
     }
-    Some(Consensus { doubtful: doubtful || found.doubtful, ..found })
+    Some(found)
 }
 
 /// One search in the present noise, which is estimated again from the best candidate's residuals if it is
