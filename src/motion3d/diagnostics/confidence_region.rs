@@ -13,6 +13,7 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::Smoother;
 use crate::motion3d::model::rows::tangents;
+use crate::motion3d::solver::refine::MANY;
 use crate::motion3d::solver::smoothing::DepthSmoother;
 use crate::motion3d::solver::starts::{at_most, evaluate};
 use nalgebra::Vector3;
@@ -52,16 +53,15 @@ struct TestedDirection {
 }
 
 /// Whether any direction of the half sphere, farther from that of the first of `motions` (the estimate),
-/// explains the flow of `most` points as well as the best of these, depth signs included. A covariance is
+/// explains the flow of as many points as a search begins with as well as the best of these, depth signs included. A covariance is
 /// that of one minimum; a whole line of minima shows here.
 pub(crate) fn plausible_beyond(
     observations: &Observations,
     motions: &[Motion],
     farther: Farther,
-    most: usize,
     rng: CounterRng,
 ) -> bool {
-    let searched = &*at_most(observations, most, rng);
+    let searched = &*at_most(observations, MANY, rng);
     let first = motions[0].u();
     let known: Vec<TestedDirection> =
         motions.iter().filter_map(|motion| test_direction(searched, &motion.u(), &first)).collect();

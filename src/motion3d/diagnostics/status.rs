@@ -13,7 +13,7 @@ use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::robust::CompetingMotion;
 use crate::motion3d::solver::covariance::{DETERMINED, direction_deviation};
 use crate::motion3d::solver::likelihood::SAME;
-use crate::motion3d::solver::refine::{StoppingCriteria, descend};
+use crate::motion3d::solver::refine::{MANY, StoppingCriteria, descend};
 use crate::motion3d::solver::starts::{SEARCHED, at_most};
 use nalgebra::{Matrix2x3, SymmetricEigen};
 
@@ -35,12 +35,6 @@ const CONSISTENT: f64 = 3.0;
 /// How many times the estimate's own standard deviation that of maximum likelihood may count: where it is
 /// larger still, other directions are what is looked for.
 const MAX_LIKELIHOOD_RATIO: f64 = 1.5;
-
-/// Most points that are tested again where few leave a doubt.
-const ASKED_AGAIN: usize = 16_000;
-
-/// The angle, degrees, beyond which few points are not tested.
-const BLIND: f64 = 20.0;
 
 /// Squared depths behind the camera, in units of their standard deviation, that exclude the other motion of a
 /// plane.
@@ -140,24 +134,14 @@ fn planar(
 /// where the cost along a line of directions is curved, the covariance at the minimum is too small.
 ///
 /// `own` and `likelihood`: standard deviations of the estimate and of maximum likelihood, whose residuals are
-/// looked at; of the points that the search sees they are that much larger. Where few of many points leave a
-/// doubt, [`ASKED_AGAIN`] of them are tested: with noisy depths the standard deviation of the few grows
-/// faster than by the root of their number.
+/// looked at; of the points that the search sees they are that much larger.
 fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rng: CounterRng) -> bool {
-    let beyond = |most: usize| {
-        let fewer = (inliers.n as f64 / inliers.n.min(most) as f64).sqrt();
-        let farther = Farther {
-            residuals: FAR * own.max(likelihood.min(MAX_LIKELIHOOD_RATIO * own)) * fewer + SPACING,
-            chance: CONSISTENT * own * fewer + SPACING,
-        };
-        plausible_beyond(inliers, motions, farther, most, rng)
+    let fewer = (inliers.n as f64 / inliers.n.min(MANY) as f64).sqrt();
+    let farther = Farther {
+        residuals: FAR * own.max(likelihood.min(MAX_LIKELIHOOD_RATIO * own)) * fewer + SPACING,
+        chance: CONSISTENT * own * fewer + SPACING,
     };
-    if inliers.n <= SEARCHED {
-        return beyond(SEARCHED);
-    }
-    // Where the standard deviation of few is too large for anything to lie beyond it, these decide nothing.
-    let blind = CONSISTENT * own * (inliers.n as f64 / SEARCHED as f64).sqrt() > BLIND;
-    (blind || beyond(SEARCHED)) && beyond(ASKED_AGAIN)
+    plausible_beyond(inliers, motions, farther, rng)
 }
 
 /// Whether the points determine all five unknowns: points at one or a few places, or on a line through the

@@ -263,17 +263,9 @@ fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRn
     if !observations.independent || !keeps("motion3d.residual_structure") {
         return found;
     }
-    let mut on = search_sample(observations, rng);
-    let inner = on.n == observations.n;
-    // Residuals that are cut off at too small a noise do not pull the estimate.
-    let variance = larger(observations, &found.motion);
-    if variance > 1.0 {
-        on.to_mut().rescale(variance.sqrt().recip());
-    }
-    let shown = if inner && variance <= 1.0 { found.inner.clone() } else { inliers_of(&on, &found.motion) };
-    let instead = two_motions::competing_motion(&on, &found.motion, &shown, rng);
-    let instead = instead.map(|other| CompetingMotion { excess: other.excess * variance, ..other });
-    found.competing.extend(instead);
+    let on = search_sample(observations, rng);
+    let shown = if on.n == observations.n { found.inner.clone() } else { inliers_of(&on, &found.motion) };
+    found.competing.extend(two_motions::competing_motion(&on, &found.motion, &shown, rng));
     found
 }
 
