@@ -1,7 +1,7 @@
 //! Entry point: estimates rigid motion from optical flow. Searches the inliers where it must, fits the motion
 //! to them and assembles the result.
 
-use super::diagnostics::report::{doubted, of_estimated_noise, report, rotation_report, with_all_inliers};
+use super::diagnostics::report::{doubted, of_estimated_noise, report, rotation_report};
 use super::diagnostics::rotation_only::{
     explained_by_rotation, explained_by_rotation_in_unknown_noise, without_likeliest_rotation,
 };
@@ -101,9 +101,9 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     let Some(kept) = consensus(&whitening, &mut scaled, rng.stream(1)) else {
         return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.noise_std);
     };
-    let inner = scaled.observations.subset(&kept.inner);
-    let found = Task { whitening: &whitening, options, known: Some(&kept), rng }.on(&mut scaled, inner);
-    doubted(with_all_inliers(found, &scaled.observations, &kept), &scaled.observations)
+    let inliers = scaled.observations.subset(&kept.inliers);
+    let found = Task { whitening: &whitening, options, known: Some(&kept), rng }.on(&mut scaled, inliers);
+    doubted(found, &scaled.observations)
 }
 
 /// The inliers of one motion, judged by their own errors.
@@ -178,7 +178,9 @@ impl Task<'_, '_> {
         match (&self.options.initial, self.known) {
             (Some(initial), _) => vec![refine(inliers, initial.normalized(), StoppingCriteria::FULL)],
             (None, None) => minima(inliers, self.rng.stream(2)),
-            (None, Some(known)) => again(inliers, known),
+            // Among many outliers that motion is already the likeliest.
+            (None, Some(known)) if known.many => vec![refine(inliers, known.motion, StoppingCriteria::NONE)],
+            (None, Some(known)) => vec![refine(inliers, known.motion, StoppingCriteria::of(inliers.n))],
         }
     }
 
@@ -279,16 +281,4 @@ impl Task<'_, '_> {
 fn misfit(inliers: &Observations, cost: f64) -> f64 {
     let free = inliers.n.saturating_sub(5) as f64 / inliers.points_per_independent_sample;
     if free > 0.0 && !by_chance(cost, free) { cost / free } else { 1.0 }
-}
-
-/// The minimum that a robust search led to, and those that other minima for the same points lead to.
-///
-/// Among many outliers that motion is already the likeliest.
-fn again(inliers: &Observations, known: &Consensus) -> Vec<Minimum> {
-    if known.many {
-        return vec![refine(inliers, known.motion, StoppingCriteria::NONE)];
-    }
-    let others = known.competing.iter().filter(|competitor| !competitor.others).map(|competitor| competitor.motion);
-    let motions: Vec<Motion> = std::iter::once(known.motion).chain(others).collect();
-    different(motions.into_par_iter().map(|motion| refine(inliers, motion, StoppingCriteria::of(inliers.n))).collect())
 }

@@ -1,5 +1,6 @@
-//! Plain data: frames, masks, regions, flow fields. No algorithms.
+//! Plain data: cameras, frames, masks, regions, flow fields. No algorithms.
 
+mod camera;
 mod field;
 mod frame;
 mod motion;
@@ -8,6 +9,7 @@ mod region;
 mod status;
 mod track;
 
+pub use camera::Intrinsics;
 pub use field::{FieldLayout, FlowField};
 pub use frame::{AnyColourFrame, AnyFrame, ColourFrame, Frame, Mask, Sample};
 pub use motion::{AffineFlow, MOTION_NAMES};

@@ -2,13 +2,13 @@
 
 use crate::error::Result;
 use crate::math::Real;
-use crate::motion3d::model::input::{Intrinsics, Placement, check_field};
+use crate::motion3d::model::input::{Placement, check_field};
 use crate::motion3d::model::observations::Row;
 use crate::motion3d::model::result::{CommonEffect, UncertainMotion};
 use crate::motion3d::model::rows::{Derotation, Matrix5, MidpointDepth, Vector5};
 use crate::motion3d::model::whitening::plane_row;
 use crate::parallel::Threads;
-use crate::types::{FlowField, Status};
+use crate::types::{FlowField, Intrinsics, Status};
 use nalgebra::{Matrix2, Matrix2x3, RowVector2, Vector2, Vector3};
 use rayon::prelude::*;
 

@@ -13,7 +13,6 @@ use crate::motion3d::model::options::MotionOptions;
 use crate::motion3d::model::result::{MotionEstimate, Status, axes, nested};
 use crate::motion3d::model::rows::{Matrix5, MidpointDepth};
 use crate::motion3d::robust;
-use crate::motion3d::robust::Consensus;
 use crate::motion3d::solver::covariance::{direction_deviation, plugged};
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -196,19 +195,6 @@ pub(crate) fn report_rotation(
     }
 }
 
-/// Reports all inliers, beside those that the motion was estimated from; their depths are their
-/// own.
-pub(crate) fn with_all_inliers(mut found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
-    for &k in &kept.inliers {
-        let source = all.source[k as usize] as usize;
-        if !found.inliers[source] {
-            found.inliers[source] = true;
-            found.inverse_depth_smooth[source] = found.inverse_depth[source];
-        }
-    }
-    found
-}
-
 /// Points that decide alone make a motion doubtful that nothing worse is said against.
 pub(crate) fn doubted(found: MotionEstimate, all: &Observations) -> MotionEstimate {
     let few = found.status == Status::Ok && robust::has_high_leverage(all, &found);
@@ -221,11 +207,7 @@ pub(crate) fn doubted(found: MotionEstimate, all: &Observations) -> MotionEstima
 ///
 /// Truncated residuals determine the variance less well than all would.
 pub(crate) fn of_estimated_noise(points: usize, cut: bool) -> f64 {
-    let free = points.saturating_sub(5) as f64 * if cut { TOLD_BY_CUT } else { 1.0 };
+    let free = points.saturating_sub(5) as f64 * if cut { robust::CUT_INFORMATION } else { 1.0 };
     let free = free.max(2.0 * 2.0);
     free / (free - 2.0)
 }
-
-/// The information about a variance that is left where residuals beyond 2.5 standard deviations are cut off
-/// and the points chosen by it: 0.69 by the cut alone.
-pub(crate) const TOLD_BY_CUT: f64 = 0.6;

@@ -63,9 +63,8 @@ pub(crate) fn judge(
         solution.alternatives.retain(|known| known.motion.angle_to(&other.motion) > distinct);
         solution.alternatives.insert(0, other);
     }
-    let others = competing.iter().filter(|competitor| competitor.others);
     let same = if deviation.is_finite() { deviation.max(SAME) } else { SAME };
-    for (place, competitor) in others.clone().enumerate() {
+    for (place, competitor) in competing.iter().enumerate() {
         solution.alternatives.retain(|known| known.motion.angle_to(&competitor.motion).to_degrees() > same);
         let place = place.min(solution.alternatives.len());
         solution.alternatives.insert(place, Alternative { motion: competitor.motion, excess: competitor.excess });
@@ -81,7 +80,7 @@ pub(crate) fn judge(
     } else if !determined(inliers, &solution.motion) {
         solution.covariance = None;
         Status::IllConditioned
-    } else if planar || others.count() > 0 {
+    } else if planar || !competing.is_empty() {
         Status::Ambiguous
     } else if !solution.described
         || deviation.is_nan()

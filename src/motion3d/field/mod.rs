@@ -8,13 +8,13 @@ mod patches;
 pub use patches::{FieldPatches, field_patches};
 
 use super::estimate::estimate_motion;
-use super::model::input::{Flow, Intrinsics, Noise, check_field};
+use super::model::input::{Flow, Noise, check_field};
 use super::model::options::{CommonErrors, MotionOptions};
 use super::model::result::MotionEstimate;
 use super::patches::estimate_patch_motion;
 use crate::error::{Error, Result};
 use crate::math::{Real, median, quantile};
-use crate::types::{FlowField, Rect, SamplingGrid, Status};
+use crate::types::{FlowField, Intrinsics, Rect, SamplingGrid, Status};
 use nalgebra::{Matrix2, Vector2};
 
 /// Standard deviation of the flow's common displacement, in those of one point: in rendered rooms, by both

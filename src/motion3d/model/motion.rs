@@ -1,7 +1,7 @@
 //! A rigid motion: the flow it makes, its finite displacement, its essential matrix.
 
-use super::input::Intrinsics;
 use super::rows::{AffineRows, Derotation, Rows, Vector5, cross_matrix};
+use crate::types::Intrinsics;
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 
 /// A rigid motion of the scene relative to the camera over one frame: `X_dot = u + w x X`.

@@ -1,8 +1,8 @@
 //! The result of an estimate.
 
-use super::input::Intrinsics;
 use super::motion::Motion;
 use super::rows::{Matrix5, Vector5};
+use crate::types::Intrinsics;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, RowVector2, SMatrix, SVector, Vector2};
 
 /// Whether an estimate is usable, or why not.

@@ -1,9 +1,10 @@
 //! Whitens given points: rows with unit noise covariance.
 
-use super::input::{Flow, Intrinsics, Noise, Placement, to_plane};
+use super::input::{Flow, Noise, Placement, to_plane};
 use super::observations::{Observations, Row};
 use super::rows::{Derotation, Rows, tangents};
 use crate::math::quantile;
+use crate::types::Intrinsics;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use rayon::prelude::*;
 

@@ -15,7 +15,7 @@ use crate::math::by_chance;
 use crate::math::random::CounterRng;
 use crate::motion3d::bound::{MotionBound, check_motion, with_known_depth};
 use crate::motion3d::model::input::{
-    Intrinsics, Placement, Projection, affine_map, check_covariances, check_lengths, is_positive, to_plane,
+    Placement, Projection, affine_map, check_covariances, check_lengths, is_positive, to_plane,
 };
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::options::{Method, MotionOptions};
@@ -26,6 +26,7 @@ use crate::motion3d::solver::covariance::{inverse, plugged};
 use crate::motion3d::solver::finite_rotation::{ROUNDING, ROUNDS};
 use crate::motion3d::solver::refine::Minimum;
 use crate::motion3d::solver::starts::{APART, STARTS, apart, evaluate, sample};
+use crate::types::Intrinsics;
 use nalgebra::{Matrix2, Matrix6, Vector3, Vector6};
 use report::{judge, report_motion, turning_report};
 use shrinkage::{covariance_factor, shrunk};

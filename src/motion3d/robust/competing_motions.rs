@@ -3,7 +3,7 @@
 use super::cells::Cells;
 use super::depth_consistency::DepthConsistency;
 use super::search::{GraduatedWeights, graduated};
-use super::{APART, CompetingMotion, FEWEST, INLIER, MAJORITY, cheaper_sign, inliers_of, mixture};
+use super::{APART, CompetingMotion, INLIER, MAJORITY, cheaper_sign, inliers_of, mixture};
 use crate::math::random::CounterRng;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
@@ -12,6 +12,9 @@ use rayon::prelude::*;
 
 /// Maximum number of outliers among which a second motion is searched.
 const REJECTED: usize = 128;
+
+/// Fewest rejected points among which there may be another motion.
+const MIN_REJECTED: usize = 20;
 
 /// Two motions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)`
 /// are as likely.
@@ -27,11 +30,11 @@ pub(crate) fn among_many_outliers(
 ) -> Option<(Motion, Vec<CompetingMotion>)> {
     let cells = Cells::new(on);
     let own = DepthConsistency::new(on, &cells);
-    let refined_by_posterior = candidates.par_iter().filter_map(|(motion, _)| {
+    let refined = candidates.par_iter().filter_map(|(motion, _)| {
         let (motion, cost) = mixture::refined_by_posterior(on, &own, *motion)?;
         Some((motion, cost, inliers_of(on, &motion)))
     });
-    let mut found: Vec<(Motion, f64, Vec<u32>)> = refined_by_posterior.collect();
+    let mut found: Vec<(Motion, f64, Vec<u32>)> = refined.collect();
     found.sort_by(|a, b| a.1.total_cmp(&b.1));
     let majority = MAJORITY * on.n as f64;
     // The motion of an object may be the likeliest, but it is not the scene's.
@@ -45,7 +48,7 @@ pub(crate) fn among_many_outliers(
         let as_likely = *other < cost + UNDECIDED * (on.n as f64).sqrt();
         let same = |known: &Motion| known.angle_to(motion).to_degrees() < APART;
         if (as_many || as_likely) && !same(&best) && !competing.iter().any(|competitor| same(&competitor.motion)) {
-            competing.push(CompetingMotion { motion: *motion, excess: (other - cost).max(0.0), others: true });
+            competing.push(CompetingMotion { motion: *motion, excess: (other - cost).max(0.0) });
         }
     }
     let best = if on.n == observations.n { best } else { mixture::refined_by_posterior(observations, gate, best)?.0 };
@@ -58,7 +61,7 @@ pub(crate) fn among_many_outliers(
 pub(crate) fn second(observations: &Observations, best: Motion, rng: CounterRng) -> Option<(Motion, f64)> {
     let inliers = inliers_of(observations, &best);
     let rejected: Vec<u32> = (0..observations.n as u32).filter(|k| inliers.binary_search(k).is_err()).collect();
-    if rejected.len() < FEWEST || (rejected.len() as f64) < MAJORITY * observations.n as f64 {
+    if rejected.len() < MIN_REJECTED || (rejected.len() as f64) < MAJORITY * observations.n as f64 {
         return None;
     }
     // What may be the scene is much of the rejected: few of them show it.
@@ -69,21 +72,20 @@ pub(crate) fn second(observations: &Observations, best: Motion, rng: CounterRng)
     Some(cheaper_sign(observations, graduated(observations, found, INLIER)))
 }
 
-/// Of the candidates, cheapest first, those that cost about as much as the first, or that have fewer
-/// inliers only because other points fit them.
+/// Of the candidates, cheapest first, those that have fewer inliers than the first only because other points
+/// fit them.
 pub(crate) fn competing_motions(observations: &Observations, candidates: &[(Motion, f64)]) -> Vec<CompetingMotion> {
-    let (n, best) = (observations.n as f64, candidates[0]);
+    let (majority, best) = (MAJORITY * observations.n as f64, candidates[0]);
     let inliers_of_best = inliers_of(observations, &best.0);
-    let limit = best.1 + INLIER * INLIER * MAJORITY * n;
+    let limit = best.1 + INLIER * INLIER * majority;
     let mut found: Vec<CompetingMotion> = Vec::new();
     for (motion, cost) in candidates.iter().skip(1).take_while(|(_, cost)| *cost < limit) {
         let same = |other: &Motion| other.angle_to(motion).to_degrees() < APART;
-        if same(&best.0) || found.iter().any(|competitor| same(&competitor.motion)) {
-            continue;
-        }
         let inliers = inliers_of(observations, motion);
-        let new = inliers.iter().filter(|k| inliers_of_best.binary_search(k).is_err()).count();
-        found.push(CompetingMotion { motion: *motion, excess: cost - best.1, others: new as f64 > MAJORITY * n });
+        let new = inliers.iter().filter(|k| inliers_of_best.binary_search(k).is_err()).count() as f64;
+        if new > majority && !same(&best.0) && !found.iter().any(|competitor| same(&competitor.motion)) {
+            found.push(CompetingMotion { motion: *motion, excess: cost - best.1 });
+        }
     }
     found
 }

@@ -4,7 +4,7 @@
 //! the noise. No residual shows that. But the motion of the scene is then another one, which fits all points
 //! except those of one region, and its depth map is as smooth and as far in front of the camera.
 
-use super::cells::{Cells, Neighbourhoods};
+use super::cells::Cells;
 use super::search::GraduatedWeights;
 use super::{APART, Candidates, CompetingMotion, INLIER, STOPPING, cheaper_sign, inliers_of, truncated};
 use crate::math::random::CounterRng;
@@ -65,7 +65,6 @@ pub(crate) fn hidden_object(
     if deviation < MIN_DIRECTION_STD {
         return None;
     }
-    let around = Neighbourhoods::new(cells, observations.n);
     let mut motions: Vec<Motion> = candidates.iter().skip(1).map(|(motion, _)| *motion).collect();
     for (place, region) in cells.halves(observations.n / 4).into_iter().enumerate() {
         motions.extend(outside(observations, region, rng.stream(place as u64)));
@@ -75,7 +74,7 @@ pub(crate) fn hidden_object(
         .into_iter()
         .filter_map(|motion| of_scene(observations, motion))
         .filter(|(motion, scene)| {
-            motion.angle_to(best).to_degrees() > distinct && is_one_region(&around, &fitted, scene, observations.n)
+            motion.angle_to(best).to_degrees() > distinct && is_one_region(cells, &fitted, scene, observations.n)
         })
         .collect();
     others.sort_by_key(|(_, scene)| std::cmp::Reverse(scene.len()));
@@ -86,7 +85,7 @@ pub(crate) fn hidden_object(
     };
     let (motion, _) = others.iter().find(likely)?;
     let excess = truncated(observations, motion, INLIER) - truncated(observations, best, INLIER);
-    Some(CompetingMotion { motion: *motion, excess: excess.max(0.0), others: true })
+    Some(CompetingMotion { motion: *motion, excess: excess.max(0.0) })
 }
 
 /// Motions that a search without the points of a `region` finds.
@@ -117,12 +116,12 @@ fn of_scene(observations: &Observations, mut motion: Motion) -> Option<(Motion, 
 }
 
 /// Whether the points that only the first motion fits lie together, as those of an object do.
-fn is_one_region(around: &Neighbourhoods<'_>, fitted: &[u32], scene: &[u32], n: usize) -> bool {
+fn is_one_region(cells: &Cells, fitted: &[u32], scene: &[u32], n: usize) -> bool {
     let mut is_scene = vec![false; n];
     for &k in scene {
         is_scene[k as usize] = true;
     }
-    let rejected = around.rejected(&is_scene);
+    let rejected = cells.rejected(&is_scene);
     let lost: Vec<f64> = fitted.iter().filter(|&&k| !is_scene[k as usize]).map(|&k| rejected[k as usize]).collect();
     let coherence = lost.iter().sum::<f64>() / lost.len().max(1) as f64;
     (lost.len() as f64) < MAX_OBJECT * n as f64 && coherence > MIN_COHERENCE

@@ -39,7 +39,7 @@ fn posterior(odds: &Odds, density: f64) -> f64 {
     density / (density + odds.outliers)
 }
 
-/// From the motion of the inner inliers, with the depths `smooth` of these in its weights (`None`: their
+/// From the motion of the inliers, with the depths `smooth` of these in its weights (`None`: their
 /// own), to the root of the equation with probabilities, if it `moves`; the covariance, in the axes `tangent`,
 /// grows as the information shrinks. `None` where nothing is known of outliers.
 pub(crate) fn weighted_by_posterior(
@@ -50,8 +50,8 @@ pub(crate) fn weighted_by_posterior(
     moves: bool,
 ) -> Option<(Motion, Matrix2x3<f64>, Matrix5)> {
     let outliers = known.outliers.as_ref()?;
-    let odds = |k: usize| outliers.of(k).filter(|_| known.has_inlier_neighbours.as_ref().is_none_or(|near| near[k]));
-    let by_point = smooth.map(|smooth| of_all(all, &known.inner, smooth));
+    let odds = |k: usize| outliers.of(k);
+    let by_point = smooth.map(|smooth| of_all(all, &known.inliers, smooth));
     let nu = |motion: &Motion| by_point.as_deref().map_or_else(|| Cow::Owned(depths(all, motion).nu), Cow::Borrowed);
     let root = || -> Option<Motion> {
         let mut motion = *from;
@@ -70,7 +70,7 @@ pub(crate) fn weighted_by_posterior(
         let share = |k: usize, density: f64| odds(k).map(|odds| posterior(&odds, density) * odds.information);
         information(&weighted(all, motion, share), motion, tangent, &nu(motion), 0.0)
     };
-    let inner = all.subset(&known.inner);
+    let inner = all.subset(&known.inliers);
     let own = smooth.map_or_else(|| Cow::Owned(depths(&inner, from).nu), Cow::Borrowed);
     let before = information(&inner, from, tangent, &own, 0.0).cholesky()?.l().transpose();
     let near = |motion: &Motion| {

@@ -2,16 +2,14 @@
 //!
 //! * `search`: every direction with the best of many rotations, refined to motions with many inliers. `noise`
 //!   estimates unknown noise from these inliers, and whether few points have outliers at all.
-//! * `competing_motions`: other motions with about as many inliers, and the choice among many outliers.
-//! * `depth_consistency`: inliers whose depth is that of their neighbours; `outlier_posterior`: the
-//!   probability that an inlier is an outlier.
-//! * `cells`: inliers with many rejected neighbours, those of moving objects, are left out.
+//! * `depth_consistency`: inliers whose depth is that of their neighbours in the same of the `cells`;
+//!   `outlier_posterior`: the probability that an inlier is an outlier.
+//! * `mixture`: weighs points by that probability; `competing_motions` chooses with it among many outliers,
+//!   and finds other motions with about as many inliers.
 //! * `hidden_object`, `two_motions`: whether it is two motions.
 //!
-//! `diagnostics` calls `mixture`, which weighs points by that probability, and `leverage`, which tests
-//! whether few points decide.
+//! `diagnostics` calls `leverage`, which tests whether few points decide.
 
-mod competing_motions;
 mod depth_consistency;
 
 mod hidden_object;
@@ -20,6 +18,7 @@ mod mixture;
 mod noise;
 
 mod cells;
+mod competing_motions;
 mod outlier_posterior;
 
 mod search;
@@ -40,7 +39,7 @@ use competing_motions::{among_many_outliers, competing_motions, second};
 use depth_consistency::DepthConsistency;
 pub(crate) use leverage::has_high_leverage;
 pub(crate) use mixture::weighted_by_posterior;
-pub(crate) use noise::larger;
+pub(crate) use noise::{CUT_INFORMATION, larger};
 use outlier_posterior::OutlierPosterior;
 use search::{GraduatedWeights, graduated};
 use std::borrow::Cow;
@@ -91,18 +90,12 @@ const SELECTED: usize = 100;
 /// By how much, in nats, outliers must shorten the description of the residuals to be believed.
 const SURE: f64 = 10.0;
 
-/// Inliers below which a selection of them, whose noise is not known either, is not accepted.
-const FEWEST: usize = 20;
-
 /// A motion and its inliers.
 #[derive(Debug, Clone)]
 pub(crate) struct Consensus {
     pub motion: Motion,
     /// Indices among the observations, ascending.
     pub inliers: Vec<u32>,
-    /// Those of them that the motion is to be estimated from: some points of a moving object fit by chance,
-    /// and these pull the same way.
-    pub inner: Vec<u32>,
     /// Other motions with about as many inliers, and how much more each costs, in squared units of noise;
     /// the best first.
     pub competing: Vec<CompetingMotion>,
@@ -110,32 +103,19 @@ pub(crate) struct Consensus {
     pub many: bool,
     /// Probability that points are outliers that fit by chance; `None` if unknown.
     pub outliers: Option<OutlierPosterior>,
-    /// Points, inliers or not, with few rejected neighbours; `None`: all points.
-    pub has_inlier_neighbours: Option<Vec<bool>>,
 }
 
 impl Consensus {
     fn new(motion: Motion, inliers: Vec<u32>) -> Self {
-        Self {
-            motion,
-            inliers,
-            inner: Vec::new(),
-            competing: Vec::new(),
-            many: false,
-            outliers: None,
-            has_inlier_neighbours: None,
-        }
+        Self { motion, inliers, competing: Vec::new(), many: false, outliers: None }
     }
 }
 
-/// Another motion of many points.
+/// Another motion, of other points.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct CompetingMotion {
     pub motion: Motion,
     pub excess: f64,
-    /// Whether it has inliers that are outliers of the chosen motion: those of another object. If not, it
-    /// is another minimum for the same points.
-    pub others: bool,
 }
 
 /// Candidates for the motion with the most inliers, each with its truncated cost; the cheapest first.
@@ -204,13 +184,10 @@ fn in_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, unknown: bool, rng: 
 /// Finds the inliers of the best candidate, and competing motions.
 fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: CounterRng) -> Option<Consensus> {
     let on = &*search_sample(observations, rng);
-    if keeps("motion3d.second_motion") {
-        candidates.extend(second(on, candidates.first()?.0, rng.stream(10)));
-        candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
-    }
-    let &(best, _) = candidates.first()?;
+    candidates.extend(second(on, candidates.first()?.0, rng.stream(10)));
+    candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut competing = competing_motions(on, &candidates);
-    let mut found = settle(observations, best)?;
+    let mut found = settle(observations, candidates[0].0)?;
     let cells = Cells::new(observations);
     let gate = DepthConsistency::new(observations, &cells);
     for _ in 0..if keeps("motion3d.depth_gate") { DEPTH_ROUNDS } else { 0 } {
@@ -219,8 +196,7 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
             break;
         }
         let motion = refine(&observations.subset(&kept), found.motion, STOPPING).motion;
-        let fitted = inliers_of(observations, &motion);
-        found = Consensus::new(motion, fitted);
+        found = Consensus::new(motion, inliers_of(observations, &motion));
     }
     let (mut inliers, mut outliers) = gate.passed(&found);
     let many = keeps("motion3d.many_outliers") && outliers.as_ref().is_some_and(|outliers| outliers.share > MATTER);
@@ -229,20 +205,13 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
         (inliers, outliers) = gate.passed(&found);
         competing = others;
     }
+    found.competing = competing;
     if inliers.len() >= MIN_POINTS {
         found.inliers = inliers;
         found.outliers = outliers.filter(|_| keeps("motion3d.outlier_mixture"));
     }
-    found.competing = competing;
     if found.inliers.len() < MIN_POINTS {
         return None;
-    }
-    found.inner.clone_from(&found.inliers);
-    if keeps("motion3d.moving_objects")
-        && let Some(inner) = cells::inner(observations, &found, &cells)
-    {
-        found.inner = inner.inliers;
-        found.has_inlier_neighbours = Some(inner.has_inlier_neighbours);
     }
     if keeps("motion3d.hidden_object") && observations.independent {
         let own;
@@ -264,7 +233,7 @@ fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRn
         return found;
     }
     let on = search_sample(observations, rng);
-    let shown = if on.n == observations.n { found.inner.clone() } else { inliers_of(&on, &found.motion) };
+    let shown = if on.n == observations.n { found.inliers.clone() } else { inliers_of(&on, &found.motion) };
     found.competing.extend(two_motions::competing_motion(&on, &found.motion, &shown, rng));
     found
 }

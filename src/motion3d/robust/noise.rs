@@ -20,7 +20,7 @@ const CUT: f64 = 2.5;
 const CUT_VARIANCE: f64 = 0.911;
 
 /// The share of the information about a variance that is left to them.
-const CUT_INFORMATION: f64 = 0.69;
+pub(crate) const CUT_INFORMATION: f64 = 0.69;
 
 /// Most steps.
 const STEPS: usize = 50;

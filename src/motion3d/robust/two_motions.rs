@@ -59,7 +59,7 @@ pub(crate) fn competing_motion(
     let [more, fewer] = &two.motions;
     let motion = Some(more).filter(another).or_else(|| Some(fewer).filter(another).filter(|_| gain > EACH * n))?;
     let excess = truncated(observations, motion, INLIER) - truncated(observations, found, INLIER);
-    (gain > ALL).then(|| CompetingMotion { motion: *motion, excess: excess.max(0.0), others: true })
+    (gain > ALL).then(|| CompetingMotion { motion: *motion, excess: excess.max(0.0) })
 }
 
 /// Residual structure test of the inliers `points` of `motion`: the parts of the picture whose residuals pull
