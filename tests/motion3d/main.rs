@@ -6,9 +6,12 @@ mod correlated_noise;
 mod degenerate;
 mod dense_points;
 mod estimators;
+mod field_patches;
+mod field_points;
 mod finite_rotation;
 mod lateral;
 mod maximum_likelihood;
+mod motion_model;
 mod moving_objects;
 mod narrow_fields;
 mod noisy_depths;
@@ -19,6 +22,7 @@ mod published;
 mod rotation_prior;
 mod scenes;
 mod statuses;
+mod time_to_contact;
 
 // The scenes name them by their place in the crate, whose unit tests share them.
 use jacoflow::{math, motion3d};

@@ -216,6 +216,3 @@ fn transport([dx, dy]: [f64; 2]) -> SMatrix<f64, 6, UNKNOWN> {
     }
     out
 }
-
-#[cfg(test)]
-mod tests;

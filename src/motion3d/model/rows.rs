@@ -317,6 +317,17 @@ mod tests {
     }
 
     #[test]
+    fn screen_rows_are_the_flow_of_the_sphere() {
+        let eta = Vector3::new(0.48, -0.6, 0.64);
+        let motion = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
+        let (rows, axes) = (Rows::sphere(&eta), tangents(&eta));
+        let flow = Vector3::from(motion.sphere_flow(eta.into(), 0.8));
+        let model = rows.g * motion.u() * 0.8 + rows.r * motion.w();
+        assert!((axes * flow - model).norm() < 1e-15);
+        assert!((axes.row(0).transpose().cross(&axes.row(1).transpose()) - eta).norm() < 1e-15);
+    }
+
+    #[test]
     fn series_join_the_closed_forms() {
         let axis = Vector3::new(0.6, -0.48, 0.64);
         let (below, above) = (Derotation::new(&(axis * 0.999e-3)), Derotation::new(&(axis * 1.001e-3)));

@@ -1,12 +1,17 @@
 //! Windows of fields whose flow is known.
 
-use super::*;
 use crate::math::random::CounterRng;
-use crate::motion3d::model::rows::{Matrix5, Vector5};
-use crate::motion3d::{Intrinsics, Motion, MotionOptions, Placement, Status as MotionStatus, estimate_patch_motion};
-use crate::types::FieldLayout;
+use crate::motion3d::{
+    Intrinsics, Motion, MotionEstimate, MotionOptions, Placement, Status as MotionStatus, estimate_patch_motion,
+    field_patches,
+};
+use jacoflow::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, SamplingGrid, Status};
+use nalgebra::{SMatrix, SVector};
 
 const FOCAL: f64 = 500.0;
+
+/// Area over which errors are one, in squared correlation lengths.
+const AREA: f64 = std::f64::consts::PI * (4.0 * 0.4 + 2.0 * 0.6 * 3.75 * 3.75);
 
 /// Standard deviations of the flow, px, and of its slopes, 1/frame, at each pixel.
 const NOISE: [f64; 6] = [0.06, 0.06, 0.006, 0.006, 0.006, 0.006];
@@ -72,7 +77,7 @@ fn an_affine_flow_is_reported_at_the_middles() {
     }
     // Every other pixel, whose errors go together over 3 px: 58 * 9 / 4 of them are one.
     let sparse = field_patches(&field(2, 3.0, affine), 60, None).unwrap();
-    let sharing = std::f64::consts::PI * (4.0 * 0.4 + 2.0 * 0.6 * 3.75 * 3.75) * 9.0 / 4.0;
+    let sharing = AREA * 9.0 / 4.0;
     for k in [0, 14] {
         let larger = sparse.covariances[k] / found.covariances[k] / (4.0 * sharing);
         assert!((larger - 1.0).abs() < 0.02, "{k}: {larger}");
@@ -173,12 +178,12 @@ fn drive(motion: &Motion, seed: u64) -> FlowField<f64> {
 }
 
 /// Squared distance of the truth in units of the covariance.
-fn squared(found: &crate::motion3d::MotionEstimate, truth: &Motion) -> f64 {
+fn squared(found: &MotionEstimate, truth: &Motion) -> f64 {
     let off: Vec<f64> = (0..3).map(|i| truth.translation[i] - found.motion.translation[i]).collect();
     let along = |axis: usize| (0..3).map(|i| found.tangent[axis][i] * off[i]).sum::<f64>();
     let turn = |i: usize| truth.rotation[i] - found.motion.rotation[i];
-    let error = Vector5::from_column_slice(&[along(0), along(1), turn(0), turn(1), turn(2)]);
-    let covariance = Matrix5::from_fn(|i, j| found.covariance[i][j]);
+    let error = SVector::<f64, 5>::from_column_slice(&[along(0), along(1), turn(0), turn(1), turn(2)]);
+    let covariance = SMatrix::<f64, 5, 5>::from_fn(|i, j| found.covariance[i][j]);
     (error.transpose() * covariance.try_inverse().unwrap() * error)[0]
 }
 
@@ -202,7 +207,7 @@ fn six_to_twenty_patches_determine_the_motion_and_say_how_surely() {
         assert!(ok >= 20 && held >= 22 && errors[12] < most, "{size}: {held} of {ok}, {}", errors[12]);
         // This noise has no tail, so that the area over which it is one is smaller than the one that is
         // reckoned with.
-        let mean = sum / 24.0 / 5.0 * area() / (4.0 * std::f64::consts::PI);
+        let mean = sum / 24.0 / 5.0 * AREA / (4.0 * std::f64::consts::PI);
         assert!((0.4..2.2).contains(&mean), "{size}: {mean}");
     }
 }
