@@ -2,10 +2,10 @@
 //! to them and assembles the result.
 
 use super::diagnostics::report::{doubted, of_estimated_noise, report, rotation_report};
-use super::diagnostics::rotation_only::{
+use super::diagnostics::rotation::of_flow_alone;
+use super::diagnostics::rotation::{
     explained_by_rotation, explained_by_rotation_in_unknown_noise, without_likeliest_rotation,
 };
-use super::diagnostics::rotation_prior::of_flow_alone;
 use super::diagnostics::solution::Solution;
 use super::diagnostics::status::judge;
 use super::model::input::{Flow, Noise};

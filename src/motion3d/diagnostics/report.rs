@@ -2,8 +2,8 @@
 
 use super::contact::{Rates, Slopes};
 use super::correlated_noise::correlated_rotation_covariance;
-use super::rotation_only::RotationOnly;
-use super::rotation_prior::rotation_contradiction;
+use super::rotation::RotationOnly;
+use super::rotation::rotation_contradiction;
 use super::solution::{Solution, rotation_shift};
 use crate::motion3d::kernels::{Depths, Equations, depths, equations};
 use crate::motion3d::model::input::{Flow, to_plane};

@@ -2,7 +2,7 @@
 //! covariance.
 
 use super::correlated_noise::{Weighted, correlated_covariance};
-use super::rotation_prior::{CovarianceParts, contradiction};
+use super::rotation::{CovarianceParts, contradiction};
 use crate::motion3d::kernels::{depths, equations, information, slopes};
 use crate::motion3d::model::input::{Flow, to_plane};
 use crate::motion3d::model::motion::Motion;

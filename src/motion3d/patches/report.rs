@@ -4,7 +4,7 @@ use super::FEW;
 use super::system::System;
 use crate::motion3d::diagnostics::contact::Rates;
 use crate::motion3d::diagnostics::report::{report_rotation, set_motion};
-use crate::motion3d::diagnostics::rotation_only::RotationOnly;
+use crate::motion3d::diagnostics::rotation::RotationOnly;
 use crate::motion3d::diagnostics::status::{SURE, WIDE};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::options::CommonErrors;

@@ -8,7 +8,7 @@
 use super::system::System;
 use crate::math::quantile;
 use crate::math::random::CounterRng;
-use crate::motion3d::diagnostics::confidence_region::PLAUSIBLE;
+use crate::motion3d::diagnostics::status::PLAUSIBLE;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::rows::{Matrix5, tangents};
 use crate::motion3d::solver::covariance::{inverse, plugged};

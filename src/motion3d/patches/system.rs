@@ -1,6 +1,6 @@
 //! Whitened patches and the sums over them, as those of points.
 
-use crate::motion3d::diagnostics::rotation_only::RotationOnly;
+use crate::motion3d::diagnostics::rotation::RotationOnly;
 use crate::motion3d::kernels::Equations;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::result::Moved;

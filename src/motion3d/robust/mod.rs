@@ -2,27 +2,20 @@
 //!
 //! * `search`: every direction with the best of many rotations, refined to motions with many inliers. `noise`
 //!   estimates unknown noise from these inliers, and whether few points have outliers at all.
-//! * `depth_consistency`: inliers whose depth is that of their neighbours in the same of the `cells`;
-//!   `outlier_posterior`: the probability that an inlier is an outlier.
-//! * `mixture`: weighs points by that probability; `competing_motions` chooses with it among many outliers,
-//!   and finds other motions with about as many inliers.
-//! * `hidden_object`, `two_motions`: whether it is two motions.
+//! * `depth_consistency`: inliers whose depth is that of their neighbours in the same cell;
+//!   `outlier_posterior`: the probability that an inlier is an outlier, which weighs the points.
+//! * `competing_motions`: other motions with about as many inliers, the choice among many outliers, and objects
+//!   that noise hides.
+//! * `two_motions`: whether residuals are those of two motions.
 //!
 //! `diagnostics` calls `leverage`, which tests whether few points decide.
 
-mod depth_consistency;
-
-mod hidden_object;
-mod leverage;
-mod mixture;
-mod noise;
-
-mod cells;
 mod competing_motions;
+mod depth_consistency;
+mod leverage;
+mod noise;
 mod outlier_posterior;
-
 mod search;
-
 mod two_motions;
 
 use crate::ablation::keeps;
@@ -34,13 +27,12 @@ use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::finite_rotation::changes_inliers;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use crate::motion3d::solver::starts::at_most;
-use cells::Cells;
-use competing_motions::{among_many_outliers, competing_motions, second};
-use depth_consistency::DepthConsistency;
+use competing_motions::{among_many_outliers, competing_motions, hidden_object, second};
+use depth_consistency::{Cells, DepthConsistency};
 pub(crate) use leverage::has_high_leverage;
-pub(crate) use mixture::weighted_by_posterior;
 pub(crate) use noise::{CUT_INFORMATION, larger};
 use outlier_posterior::OutlierPosterior;
+pub(crate) use outlier_posterior::weighted_by_posterior;
 use search::{GraduatedWeights, graduated};
 use std::borrow::Cow;
 
@@ -221,7 +213,7 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
             own = Cells::new(on);
             &own
         };
-        found.competing.extend(hidden_object::hidden_object(on, cells, &found.motion, &candidates, rng.stream(11)));
+        found.competing.extend(hidden_object(on, cells, &found.motion, &candidates, rng.stream(11)));
     }
     Some(found)
 }
