@@ -19,7 +19,7 @@ use crate::motion3d::model::result::{Alternative, Status};
 use crate::motion3d::model::rows::{Matrix5, tangents};
 use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::robust::CompetingMotion;
-use crate::motion3d::solver::covariance::{DETERMINED, direction_deviation};
+use crate::motion3d::solver::covariance::{determined, direction_deviation};
 use crate::motion3d::solver::likelihood::SAME;
 use crate::motion3d::solver::refine::{MANY, StoppingCriteria, descend};
 use crate::motion3d::solver::smoothing::DepthSmoother;
@@ -80,13 +80,14 @@ pub(crate) fn judge(
     }
     once(&mut solution.alternatives);
     let motions = [solution.motion, solution.likelihood.motion];
+    let here = equations(inliers, &solution.motion, &solution.tangent, None);
     solution.status = if inliers.n < FEW {
         Status::FewPoints
     } else if inliers.unseen() > 0 {
         // Rotated by so much that points are behind the camera: such a motion is not supported by all
         // of them.
         Status::IllConditioned
-    } else if !determined(inliers, &solution.motion) {
+    } else if determined(&here.h).is_none() {
         solution.covariance = None;
         Status::IllConditioned
     } else if planar || !competing.is_empty() {
@@ -150,30 +151,6 @@ fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rn
         chance: CONSISTENT * own * fewer + SPACING,
     };
     plausible_beyond(inliers, motions, farther, rng)
-}
-
-/// Whether the points determine all five unknowns: points at one or a few places, or on a line through the
-/// epipole, do not, although their noise seems to.
-pub(crate) fn determined(observations: &Observations, motion: &Motion) -> bool {
-    let tangent = tangents(&motion.u());
-    let h = equations(observations, motion, &tangent, None).h;
-    let (mut depth, mut turn) = (0.0, 0.0);
-    for k in 0..observations.n {
-        let row = observations.row(k);
-        let t = row.g * motion.u();
-        let s2 = t.norm_squared();
-        if s2 > observations.floor {
-            let nu = t.dot(&(row.f - row.r * motion.w())) / s2;
-            depth += nu * nu * row.g.norm_squared();
-        }
-        turn += row.r.norm_squared();
-    }
-    let scale = |i: usize| if i < 2 { depth } else { turn };
-    if !(depth > 0.0 && turn > 0.0 && depth.is_finite() && turn.is_finite()) {
-        return false;
-    }
-    let relative = Matrix5::from_fn(|i, j| h[(i, j)] / (scale(i) * scale(j)).sqrt());
-    SymmetricEigen::new(relative).eigenvalues.min() > DETERMINED
 }
 
 /// Squared standard deviations by which the opposite must be worse to be excluded: a chance of about 1 in

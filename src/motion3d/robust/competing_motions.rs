@@ -6,7 +6,7 @@
 
 use super::depth_consistency::{Cells, DepthConsistency};
 use super::outlier_posterior::refined_by_posterior;
-use super::search::{GraduatedWeights, graduated};
+use super::search::{graduated, robust_motions};
 use super::{APART, Candidates, CompetingMotion, INLIER, MAJORITY, STOPPING, cheaper_sign, inliers_of, truncated};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::equations;
@@ -79,7 +79,7 @@ pub(crate) fn second(observations: &Observations, best: Motion, rng: CounterRng)
     // What may be the scene is much of the rejected: few of them show it.
     let chosen = sample(rejected.len(), REJECTED, rng.stream(8));
     let rest = observations.subset(&chosen.iter().map(|&place| rejected[place as usize]).collect::<Vec<u32>>());
-    let found = GraduatedWeights::new(&rest).motions(1, rng).pop()?;
+    let found = robust_motions(&rest, 1, rng).pop()?;
     let found = cheaper_sign(&rest, found).0;
     Some(cheaper_sign(observations, graduated(observations, found, INLIER)))
 }
@@ -179,7 +179,7 @@ fn outside(observations: &Observations, region: &[u32], rng: CounterRng) -> Vec<
     let rest: Vec<u32> = (0..observations.n as u32).filter(|&k| !is_inside[k as usize]).collect();
     let rest = observations.subset(&rest);
     let rest = &*at_most(&rest, SEARCHED, rng.stream(1));
-    let found = GraduatedWeights::new(rest).motions(STARTS, rng);
+    let found = robust_motions(rest, STARTS, rng);
     found.into_iter().map(|motion| cheaper_sign(rest, motion).0).collect()
 }
 

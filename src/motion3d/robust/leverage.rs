@@ -3,13 +3,13 @@
 use super::INLIER;
 use crate::ablation::keeps;
 use crate::math::median;
-use crate::motion3d::kernels::depths;
+use crate::motion3d::kernels::{depths, slopes};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::result::MotionEstimate;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::solver::covariance::inverse;
-use nalgebra::{Matrix2x3, Vector3};
+use nalgebra::Matrix2x3;
 
 /// From so many inliers on no few of them decide.
 const MANY: usize = 300;
@@ -33,7 +33,10 @@ pub(crate) fn has_high_leverage(observations: &Observations, found: &MotionEstim
     }
     let chance = chance(observations, &found.motion, |k| found.inliers[observations.source[k] as usize]);
     let suspects = most_likely(chance * rejected as f64);
-    let rows: Vec<Vector5> = inliers.iter().filter_map(|&k| row(observations, found, k)).collect();
+    let tangent = Matrix2x3::from_fn(|i, j| found.tangent[i][j]);
+    let depth = |k: usize| found.inverse_depth_smooth[observations.source[k] as usize];
+    let row = |&k: &usize| slopes(observations, &found.motion, &tangent, depth(k), k);
+    let rows: Vec<Vector5> = inliers.iter().map(row).collect();
     grows(&rows, observations, suspects)
 }
 
@@ -56,21 +59,6 @@ fn most_likely(mean: f64) -> usize {
         sum += term;
     }
     count
-}
-
-/// The row `D(nu~)` of an inlier; `None` at the epipole.
-fn row(observations: &Observations, found: &MotionEstimate, k: usize) -> Option<Vector5> {
-    let point = observations.row(k);
-    let t = point.g * found.motion.u();
-    let s = t.norm();
-    if s * s <= observations.floor {
-        return None;
-    }
-    let p = nalgebra::Vector2::new(t.y, -t.x) / s;
-    let nu = found.inverse_depth_smooth[observations.source[k] as usize];
-    let axes = Matrix2x3::from_fn(|i, j| found.tangent[i][j]);
-    let (turn, spin): (_, Vector3<f64>) = (axes * point.g.transpose() * p * nu, point.r.transpose() * p);
-    Some(Vector5::new(turn.x, turn.y, spin.x, spin.y, spin.z))
 }
 
 /// Repeatedly removes the row without which the standard deviation grows most; whether it grows too much.

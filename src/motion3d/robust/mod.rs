@@ -33,7 +33,7 @@ pub(crate) use leverage::has_high_leverage;
 pub(crate) use noise::{CUT_INFORMATION, larger};
 use outlier_posterior::OutlierPosterior;
 pub(crate) use outlier_posterior::weighted_by_posterior;
-use search::{GraduatedWeights, graduated};
+use search::{graduated, robust_motions};
 use std::borrow::Cow;
 
 /// Residual, in units of noise, from which on a point is an outlier; depths behind the camera may be as
@@ -237,7 +237,7 @@ fn search_sample(observations: &Observations, rng: CounterRng) -> Cow<'_, Observ
 
 /// Motions with many inliers, the cheapest first.
 fn searched(observations: &Observations, rng: CounterRng) -> Option<Candidates> {
-    let found = GraduatedWeights::new(observations).motions(STARTS, rng);
+    let found = robust_motions(observations, STARTS, rng);
     let mut all: Candidates = found.into_iter().map(|motion| cheaper_sign(observations, motion)).collect();
     all.sort_by(|a, b| a.1.total_cmp(&b.1));
     (!all.is_empty()).then_some(all)

@@ -1,7 +1,7 @@
 //! For every direction the best rotation of many small samples, by a truncated cost; then from the best
 //! directions to motions of many inliers, by graduated weights.
 
-use super::{APART, INLIER, search};
+use super::{APART, INLIER};
 use crate::math::random::CounterRng;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{LESS_ROUND, Observations};
@@ -70,7 +70,7 @@ fn triple(n: usize, rng: CounterRng) -> [usize; 3] {
 ///
 /// The spacing of the directions itself leaves residuals in proportion to a point's flow: each has a bound of
 /// its own, at least `least`, else the share `spacing` of its flow.
-pub(crate) fn search(observations: &Observations, least: f64, spacing: f64, rng: CounterRng) -> Vec<(Motion, f64)> {
+fn search(observations: &Observations, least: f64, spacing: f64, rng: CounterRng) -> Vec<(Motion, f64)> {
     let chosen = sample(observations.n, SEARCHED, rng.stream(0));
     let few: Vec<_> = chosen.iter().map(|&k| observations.row(k as usize)).collect();
     let draws = rng.stream(1);
@@ -110,34 +110,21 @@ const SPACING: f64 = 0.06;
 /// What the cut of Tukey's weights is divided by from one refinement to the next.
 const CUT_RATIO: f64 = 1.6;
 
-/// The same points, with rounder noise first: where it is far from round minima are too graduated for the
-/// search.
-pub(crate) struct GraduatedWeights<'a> {
-    rounder: Vec<Observations>,
-    own: &'a Observations,
-}
-
-impl<'a> GraduatedWeights<'a> {
-    pub fn new(own: &'a Observations) -> Self {
-        Self { rounder: own.rounder(), own }
-    }
-
-    /// The most promising directions of the search, at most `count`, refined one by one.
-    pub fn motions(&self, count: usize, rng: CounterRng) -> Vec<Motion> {
-        let first = self.rounder.first().unwrap_or(self.own);
-        let bound = INLIER.max(SPACING * first.median_flow());
-        let starts = apart(search::search(first, INLIER, SPACING, rng), APART, count);
-        starts.into_par_iter().map(|(start, _)| self.descended(start, bound)).collect()
-    }
-
-    fn descended(&self, start: Motion, bound: f64) -> Motion {
+/// The most promising directions of the search, at most `count`, refined one by one: on the points in rounder
+/// noise first, as where that is far from round minima are too narrow for the search.
+pub(crate) fn robust_motions(own: &Observations, count: usize, rng: CounterRng) -> Vec<Motion> {
+    let rounder = own.rounder();
+    let first = rounder.first().unwrap_or(own);
+    let bound = INLIER.max(SPACING * first.median_flow());
+    let descended = |(start, _): (Motion, f64)| {
         let (mut motion, mut cut) = (start, bound);
-        for points in self.rounder.iter().chain(once(self.own)) {
+        for points in rounder.iter().chain(once(own)) {
             motion = graduated(points, motion, cut);
             cut = INLIER * LESS_ROUND;
         }
         motion
-    }
+    };
+    apart(search(first, INLIER, SPACING, rng), APART, count).into_par_iter().map(descended).collect()
 }
 
 /// Refines with Tukey's weights, which graduated from `bound` to the inliers'.

@@ -3,7 +3,7 @@
 //! A moving object and the scene may fit a third motion together with residuals as small as noise, but those
 //! of each pull the estimate another way: a score test of parts of the picture shows it.
 
-use super::search::GraduatedWeights;
+use super::search::robust_motions;
 use super::{APART, CompetingMotion, INLIER, MIN_POINTS, cheaper_sign, truncated};
 use crate::math::chi2_deviation;
 use crate::math::kd_tree::{Neighbours, Tree};
@@ -44,7 +44,7 @@ pub(crate) fn competing_motion(
     points: &[u32],
     rng: CounterRng,
 ) -> Option<CompetingMotion> {
-    let parts = residual_structure(observations, found, points)?;
+    let parts = deviating_parts(observations, found, points)?;
     let own = observations.subset(points);
     let (n, together) = (own.n as f64, refine(&own, *found, StoppingCriteria::FULL).equations.cost);
     let division = Division::of(own);
@@ -62,21 +62,6 @@ pub(crate) fn competing_motion(
     (gain > ALL).then(|| CompetingMotion { motion: *motion, excess: excess.max(0.0) })
 }
 
-/// Residual structure test of the inliers `points` of `motion`: the parts of the picture whose residuals pull
-/// the estimate another way than those elsewhere; `None` without one.
-fn residual_structure(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
-    if points.len() < MIN_TESTED {
-        return None;
-    }
-    let seen = depths(observations, motion).e;
-    let squares: f64 = points.iter().map(|&k| seen[k as usize].powi(2)).sum();
-    if squares <= LITTLE * points.len() as f64 {
-        return None;
-    }
-    let parts = deviating_parts(observations, motion, points);
-    (!parts.is_empty()).then_some(parts)
-}
-
 /// The smallest parts, as a share of the points, and the fewest points of one.
 const PART: usize = 16;
 const MIN_PART: usize = 8;
@@ -89,17 +74,19 @@ const FAR: f64 = 2.5;
 /// rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Parts of `points`, by their places among these, whose residuals pull the estimate on all of them farther
-/// than noise does, the farthest first.
+/// Parts of the inliers `points` of `motion`, by their places among these, whose residuals pull the estimate on
+/// all of them farther than noise does, the farthest first; `None` of few points, or where residuals are far
+/// less than noise.
 ///
 /// The sums `g = sum D^t e` of a part are zero but for noise of the covariance `H_r - H_r H^-1 H_r`, with
 /// `H_r = sum D^t D` over the part and `H` over all (the score test of C. R. Rao 1948). Parts are halves of
 /// the points, halves of these, and so on.
-pub(crate) fn deviating_parts(observations: &Observations, motion: &Motion, points: &[u32]) -> Vec<Vec<u32>> {
-    tested_parts(observations, motion, points).unwrap_or_default()
-}
-
-fn tested_parts(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
+fn deviating_parts(observations: &Observations, motion: &Motion, points: &[u32]) -> Option<Vec<Vec<u32>>> {
+    let seen = depths(observations, motion).e;
+    let squares: f64 = points.iter().map(|&k| seen[k as usize].powi(2)).sum();
+    if points.len() < MIN_TESTED || squares <= LITTLE * points.len() as f64 {
+        return None;
+    }
     let own = observations.subset(points);
     let least = refine(&own, *motion, StoppingCriteria::FULL);
     let whiten = least.equations.h.cholesky()?.l();
@@ -121,7 +108,7 @@ fn tested_parts(observations: &Observations, motion: &Motion, points: &[u32]) ->
     let far = parts.into_iter().map(|places| (departs(&places), places)).filter(|(departs, _)| *departs > FAR);
     let mut far: Vec<(f64, Range<usize>)> = far.collect();
     far.sort_by(|a, b| b.0.total_cmp(&a.0));
-    Some(far.into_iter().map(|(_, places)| tree.order()[places].to_vec()).collect())
+    (!far.is_empty()).then(|| far.into_iter().map(|(_, places)| tree.order()[places].to_vec()).collect())
 }
 
 /// How far the `pull` of a part that has the `share` of all information is from noise, in standard
@@ -192,7 +179,7 @@ impl Division {
                     return None;
                 }
                 *motion = if round < SEARCHES {
-                    GraduatedWeights::new(&members).motions(1, rng).pop()?
+                    robust_motions(&members, 1, rng).pop()?
                 } else {
                     refine(&members, *motion, StoppingCriteria::ROUGH).motion
                 };
@@ -253,12 +240,12 @@ mod tests {
                 scene.flow[k] = [0, 1].map(|j| scene.flow[k][j] + after[j] - before[j]);
             }
             let points = scene.observations();
-            assert!(residual_structure(&points, &oblique(), &all[..MIN_TESTED - 1]).is_none());
-            residual_structure(&points, &oblique(), &all).is_some()
+            assert!(deviating_parts(&points, &oblique(), &all[..MIN_TESTED - 1]).is_none());
+            deviating_parts(&points, &oblique(), &all).is_some()
         };
         assert!((0..20).filter(|&seed| structured(seed)).count() >= 10);
         let settled = Scene::oblique(400, 0.0, 1).observations();
-        assert!(residual_structure(&settled, &oblique(), &all).is_none());
+        assert!(deviating_parts(&settled, &oblique(), &all).is_none());
     }
 
     #[test]
@@ -267,7 +254,7 @@ mod tests {
         let (mut chance, mut found) = (0, 0);
         for seed in 0..200 {
             let mut scene = Scene::oblique(400, 0.02, seed);
-            chance += u32::from(!deviating_parts(&scene.observations(), &oblique(), &all).is_empty());
+            chance += u32::from(deviating_parts(&scene.observations(), &oblique(), &all).is_some());
             // Two standard deviations of a point, most of which passes for depth.
             let turned = Motion::new(oblique().translation, W.map(|w| 2.0 * w));
             for k in (0..400).filter(|&k| scene.points[k][0] > 0.3) {
@@ -275,17 +262,9 @@ mod tests {
                 let (before, after) = (oblique().plane_flow(at, nu), turned.plane_flow(at, nu));
                 scene.flow[k] = [0, 1].map(|j| scene.flow[k][j] + after[j] - before[j]);
             }
-            found += u32::from(!deviating_parts(&scene.observations(), &oblique(), &all).is_empty());
+            found += u32::from(deviating_parts(&scene.observations(), &oblique(), &all).is_some());
         }
         assert!(chance <= 50 && found >= 190, "{chance} {found}");
-    }
-
-    #[test]
-    fn parts_that_determine_nothing_pull_nowhere() {
-        // Halves of eight points, and none.
-        let few = Scene::oblique(16, 0.02, 1).observations();
-        assert!(deviating_parts(&few, &oblique(), &(0..16).collect::<Vec<u32>>()).is_empty());
-        assert!(deviating_parts(&few, &oblique(), &(0..5).collect::<Vec<u32>>()).is_empty());
     }
 
     #[test]

@@ -63,13 +63,6 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
             starts.into_par_iter().map(|start| refine(&fewer, start, StoppingCriteria::ROUGH)).collect();
         let mut finalists = candidates(&fewer, &different(rough));
         finalists.truncate(FINALISTS);
-        // What leaves more on few points than chance explains need not be followed on many, regardless of its
-        // signs and depths. (Signs do not decide here: at a minimum that is not reached yet they are of other
-        // depths.)
-        let left = |finalist: &Candidate| finalist.minimum.equations.cost;
-        let least = finalists.iter().map(left).fold(f64::INFINITY, f64::min);
-        let limit = least + cost_tolerance(fewer.n) * (least / fewer.n as f64).max(1.0);
-        finalists.retain(|finalist| left(finalist) <= limit);
         let followed =
             |candidate: &Candidate| refine(observations, *candidate.motion(), StoppingCriteria::of(observations.n));
         finalists.iter().map(followed).collect()
