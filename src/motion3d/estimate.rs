@@ -9,7 +9,6 @@ use super::diagnostics::rotation::{
 use super::diagnostics::solution::Solution;
 use super::diagnostics::status::judge;
 use super::model::input::{Flow, Noise};
-use super::model::motion::Motion;
 use super::model::observations::{Observations, Scaled};
 use super::model::options::{Method, MotionOptions, RotationPrior};
 use super::model::result::{Alternative, MotionEstimate, Status};
@@ -19,14 +18,13 @@ use super::robust::{CompetingMotion, Consensus, larger};
 use super::solver::covariance::plugged;
 use super::solver::efficient::{beyond_theory, covariance_at};
 use super::solver::finite_rotation::{settle, shift};
-use super::solver::likelihood::{Candidate, candidates, different, minima, near_best, smoothed};
+use super::solver::likelihood::{Candidate, candidates, minima, near_best, smoothed};
 use super::solver::profile_likelihood::ProfileLikelihood;
 use super::solver::refine::{Minimum, StoppingCriteria, refine};
 use super::solver::smoothing::DepthSmoother;
 use crate::error::Result;
 use crate::math::by_chance;
 use crate::math::random::CounterRng;
-use rayon::prelude::*;
 
 /// Least number of points for a motion.
 pub(crate) const MIN_POINTS: usize = 5;

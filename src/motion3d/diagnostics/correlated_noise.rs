@@ -4,9 +4,9 @@
 //! With the correlation `rho(d)` of two errors at the distance `d`, the equations `sum W^t e` have the
 //! covariance `sum_kl rho(d_kl) W_k^t W_l` instead of `sum W^t W`: neighbours count by how much their rows
 //! agree, so that points which decide alone change little. How far errors correlate beyond the given length,
-//! and how large they are, is estimated from the residuals ([`Errors`]): what a
-//! scene does to flow (edges in depth, a texture that smoothing reaches across) goes together farther than its
-//! windows, and differs from field to field.
+//! and how large they are, is estimated from the residuals ([`Errors`]): what a scene does to flow (edges in
+//! depth, a texture that smoothing reaches across) goes together farther than its windows, and differs from
+//! field to field.
 
 use crate::motion3d::kernels::{depths, information, slopes};
 use crate::motion3d::model::input::Flow;

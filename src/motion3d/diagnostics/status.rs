@@ -16,7 +16,7 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::Smoother;
 use crate::motion3d::model::result::{Alternative, Status};
-use crate::motion3d::model::rows::{Matrix5, tangents};
+use crate::motion3d::model::rows::tangents;
 use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::robust::CompetingMotion;
 use crate::motion3d::solver::covariance::{determined, direction_deviation};
@@ -24,7 +24,7 @@ use crate::motion3d::solver::likelihood::SAME;
 use crate::motion3d::solver::refine::{MANY, StoppingCriteria, descend};
 use crate::motion3d::solver::smoothing::DepthSmoother;
 use crate::motion3d::solver::starts::{SEARCHED, at_most, evaluate};
-use nalgebra::{Matrix2x3, SymmetricEigen, Vector3};
+use nalgebra::{Matrix2x3, Vector3};
 
 /// Below so many points several motions may explain them exactly.
 const FEW: usize = 12;
@@ -211,8 +211,8 @@ struct TestedDirection {
 }
 
 /// Whether any direction of the half sphere, farther from that of the first of `motions` (the estimate),
-/// explains the flow of as many points as a search begins with as well as the best of these, depth signs included. A covariance is
-/// that of one minimum; a whole line of minima shows here.
+/// explains the flow of as many points as a search begins with as well as the best of these, depth signs
+/// included. A covariance is that of one minimum; a whole line of minima shows here.
 pub(crate) fn plausible_beyond(
     observations: &Observations,
     motions: &[Motion],

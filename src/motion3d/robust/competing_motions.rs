@@ -4,8 +4,8 @@
 //! the noise. No residual shows that. But the motion of the scene is then another one, which fits all points
 //! except those of one region, and its depth map is as smooth and as far in front of the camera.
 
-use super::depth_consistency::{Cells, DepthConsistency};
-use super::outlier_posterior::refined_by_posterior;
+use super::depth_consistency::{Cells, DepthConsistency, Judged};
+use super::outlier_posterior::{posterior, weighted};
 use super::search::{graduated, robust_motions};
 use super::{APART, Candidates, CompetingMotion, INLIER, MAJORITY, STOPPING, cheaper_sign, inliers_of, truncated};
 use crate::math::random::CounterRng;
@@ -15,6 +15,7 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::Smoother;
 use crate::motion3d::model::rows::tangents;
 use crate::motion3d::solver::covariance::{direction_deviation, inverse};
+use crate::motion3d::solver::efficient::solve;
 use crate::motion3d::solver::likelihood::cost_of;
 use crate::motion3d::solver::profile_likelihood::ROUND;
 use crate::motion3d::solver::refine::refine;
@@ -65,6 +66,34 @@ pub(crate) fn among_many_outliers(
     }
     let best = if on.n == observations.n { best } else { refined_by_posterior(observations, gate, best)?.0 };
     Some((best, competing))
+}
+
+/// Times that posteriors are updated on the way to a root, and a change of the direction, rad, that is not
+/// worth another.
+const MAX_UPDATES: usize = 8;
+const SETTLED: f64 = 1e-3;
+
+/// From a motion that was found by least squares to the root of the equation with probabilities, with
+/// updated probabilities on the way; with its cost. `None` if too few are inliers.
+///
+/// Outliers with depths of their own, which are large, weigh most in least squares; drawn to their
+/// neighbours' they weigh as inliers do.
+fn refined_by_posterior(all: &Observations, gate: &DepthConsistency<'_>, start: Motion) -> Option<(Motion, f64)> {
+    let (mut motion, mut rounds) = (start, 0..MAX_UPDATES);
+    loop {
+        let inliers = inliers_of(all, &motion);
+        let Judged { outliers, smooth, cost } =
+            gate.judged(&motion, &inliers).filter(|_| inliers.len() >= super::MIN_POINTS)?;
+        if rounds.next().is_none() {
+            return Some((motion, cost));
+        }
+        let points = weighted(all, &motion, |k, density| Some(posterior(&outliers.of(k)?, density)));
+        let Some(next) = solve(&points, &motion, &smooth) else { return Some((motion, cost)) };
+        if next.angle_to(&motion) < SETTLED {
+            rounds = 0..0;
+        }
+        motion = next;
+    }
 }
 
 /// Searches the motion with the most inliers among the outliers of `best` and refines it on all points, if

@@ -4,8 +4,8 @@
 //!   estimates unknown noise from these inliers, and whether few points have outliers at all.
 //! * `depth_consistency`: inliers whose depth is that of their neighbours in the same cell;
 //!   `outlier_posterior`: the probability that an inlier is an outlier, which weighs the points.
-//! * `competing_motions`: other motions with about as many inliers, the choice among many outliers, and objects
-//!   that noise hides.
+//! * `competing_motions`: other motions with about as many inliers, the choice among many outliers, and
+//!   objects that noise hides.
 //! * `two_motions`: whether residuals are those of two motions.
 //!
 //! `diagnostics` calls `leverage`, which tests whether few points decide.

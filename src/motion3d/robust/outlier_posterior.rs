@@ -3,16 +3,15 @@
 //!
 //! Of points whose depths deviate alike, `h` inliers have residuals with the density `h phi(e)`, and
 //! outliers, which do not depend on the motion, `b` in every unit of residual. Points a little farther from
-//! their epipolar lines than inliers determine `b`; the remaining inliers determine `h`. A point is an
-//! inlier with the probability `h phi(e) / (h phi(e) + b)`.
+//! their epipolar lines than inliers determine `b`; the remaining inliers determine `h`. A point is an inlier
+//! with the probability `h phi(e) / (h phi(e) + b)`.
 //!
 //! With this probability `g(e)` the estimating equation is `sum g(e) e D(nu~)^t = 0`, solved by repeated
-//! weighting. Outliers spread evenly add nothing to its mean, and
-//! nothing to its slope: when the motion changes, so do those that fit it. So the slope is that of the inliers
-//! alone, the mean of `g e^2 D^t D` by parts. Least squares on a fixed set of points treat outliers as inliers.
+//! weighting. Outliers spread evenly add nothing to its mean, and nothing to its slope: when the motion
+//! changes, so do those that fit it. So the slope is that of the inliers alone, the mean of `g e^2 D^t D` by
+//! parts. Least squares on a fixed set of points treat outliers as inliers.
 
-use super::depth_consistency::{DepthConsistency, Judged};
-use super::{Consensus, INLIER, MIN_POINTS, inliers_of};
+use super::{Consensus, INLIER};
 use crate::motion3d::kernels::{depths, information};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
@@ -192,7 +191,11 @@ const ROUNDS: usize = 8;
 const SETTLED: f64 = 1e-3;
 
 /// The points times the roots of weights: at a motion, those of inliers by their odds.
-fn weighted(all: &Observations, motion: &Motion, weight: impl Fn(usize, f64) -> Option<f64>) -> Observations {
+pub(crate) fn weighted(
+    all: &Observations,
+    motion: &Motion,
+    weight: impl Fn(usize, f64) -> Option<f64>,
+) -> Observations {
     let (seen, own) = (depths(all, motion), all.own());
     all.weighted(|k| {
         let fits = seen.e[k].abs() < INLIER * own && seen.nu[k] * seen.s2[k].sqrt() > -INLIER * own;
@@ -201,13 +204,13 @@ fn weighted(all: &Observations, motion: &Motion, weight: impl Fn(usize, f64) -> 
 }
 
 /// The probability of an inlier where its residual has this density.
-fn posterior(odds: &Odds, density: f64) -> f64 {
+pub(crate) fn posterior(odds: &Odds, density: f64) -> f64 {
     density / (density + odds.outliers)
 }
 
-/// From the motion of the inliers, with the depths `smooth` of these in its weights (`None`: their
-/// own), to the root of the equation with probabilities, if it `moves`; the covariance, in the axes `tangent`,
-/// grows as the information shrinks. `None` where nothing is known of outliers.
+/// From the motion of the inliers, with the depths `smooth` of these in its weights (`None`: their own), to
+/// the root of the equation with probabilities, if it `moves`; the covariance, in the axes `tangent`, grows
+/// as the information shrinks. `None` where nothing is known of outliers.
 pub(crate) fn weighted_by_posterior(
     all: &Observations,
     known: &Consensus,
@@ -258,33 +261,6 @@ fn of_all(all: &Observations, inner: &[u32], values: &[f64]) -> Vec<f64> {
         out[k as usize] = value;
     }
     out
-}
-
-/// From a motion that was found by least squares to the root of the equation with probabilities, with
-/// updated probabilities on the way; with its cost. `None` if too few are inliers.
-///
-/// Outliers with depths of their own, which are large, weigh most in least squares; drawn to their
-/// neighbours' they weigh as inliers do.
-pub(crate) fn refined_by_posterior(
-    all: &Observations,
-    gate: &DepthConsistency<'_>,
-    start: Motion,
-) -> Option<(Motion, f64)> {
-    let (mut motion, mut rounds) = (start, 0..ROUNDS);
-    loop {
-        let inliers = inliers_of(all, &motion);
-        let Judged { outliers, smooth, cost } =
-            gate.judged(&motion, &inliers).filter(|_| inliers.len() >= MIN_POINTS)?;
-        if rounds.next().is_none() {
-            return Some((motion, cost));
-        }
-        let points = weighted(all, &motion, |k, density| Some(posterior(&outliers.of(k)?, density)));
-        let Some(next) = solve(&points, &motion, &smooth) else { return Some((motion, cost)) };
-        if next.angle_to(&motion) < SETTLED {
-            rounds = 0..0;
-        }
-        motion = next;
-    }
 }
 
 #[cfg(test)]

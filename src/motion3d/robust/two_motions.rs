@@ -74,9 +74,9 @@ const FAR: f64 = 2.5;
 /// rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Parts of the inliers `points` of `motion`, by their places among these, whose residuals pull the estimate on
-/// all of them farther than noise does, the farthest first; `None` of few points, or where residuals are far
-/// less than noise.
+/// Parts of the inliers `points` of `motion`, by their places among these, whose residuals pull the estimate
+/// on all of them farther than noise does, the farthest first; `None` of few points, or where residuals are
+/// far less than noise.
 ///
 /// The sums `g = sum D^t e` of a part are zero but for noise of the covariance `H_r - H_r H^-1 H_r`, with
 /// `H_r = sum D^t D` over the part and `H` over all (the score test of C. R. Rao 1948). Parts are halves of

@@ -7,7 +7,7 @@ use super::smoothing::{DepthSmoother, Smoothed};
 use crate::motion3d::kernels::{Bilinear, depths, information, slope};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
+use crate::motion3d::model::rows::{Matrix5, tangents};
 use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen};
 
 /// Times that depths are smoothed and the equation is solved.
@@ -228,6 +228,7 @@ pub(crate) fn nonlinearity_covariance(minimum: &Minimum, better: &Efficient) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion3d::model::rows::Vector5;
     use crate::motion3d::tests::scenes::Scene;
 
     #[test]
