@@ -210,10 +210,10 @@ impl<T: SimdReal> Results<T> {
         let first = j * grid.columns.len() + from;
         copy(&strip.status[first..], step, &mut band.status[to.clone()]);
         for (k, plane) in band.motion.iter_mut().enumerate() {
-            let target = &mut plane[to.clone()];
-            copy(&grid.row(MOTION + k, j)[from..], step, target);
-            if k >= 2 {
-                target.iter_mut().for_each(|value| *value *= T::from_f64(strip.scale));
+            let unit = T::from_f64(if k < 2 { 1.0 } else { strip.scale });
+            let row = grid.row(MOTION + k, j)[from..].iter().step_by(step);
+            for (value, scaled) in plane[to.clone()].iter_mut().zip(row) {
+                *value = *scaled * unit;
             }
         }
         if let Some(grid) = &self.covariance {
