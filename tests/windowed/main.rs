@@ -411,7 +411,7 @@ fn sites_threads_and_levels_agree() {
             for i in 0..fine.len() {
                 let (a, b) = (coarse.covariance_at(i).unwrap(), fine.covariance_at(i).unwrap());
                 for (k, l) in (0..6).flat_map(|k| (k..6).map(move |l| (k, l))) {
-                    let (a, exact) = (f64::from(a[k][l]), b[k][l]);
+                    let (a, exact) = (a[k][l], b[k][l]);
                     // Terms of a covariance cancel: what rounding leaves of it is a share of the variances.
                     let tolerance = 1e-3 * (b[k][k] * b[l][l]).sqrt();
                     let agrees = (a - exact).abs() < tolerance || (a.is_nan() && exact.is_nan());
