@@ -280,6 +280,8 @@ mod saved_mask {
     use super::{Deserialize, Mask};
     use serde::{Deserializer, Serializer};
 
+    // Serde passes references.
+    #[allow(clippy::ref_option)]
     pub(super) fn serialize<S: Serializer>(mask: &Option<Mask>, to: S) -> Result<S::Ok, S::Error> {
         to.serialize_bool(mask.is_some())
     }
@@ -294,6 +296,8 @@ mod saved_level {
     use super::{Deserialize, Level, Serialize};
     use serde::{Deserializer, Serializer};
 
+    // Serde passes references.
+    #[allow(clippy::ref_option, clippy::trivially_copy_pass_by_ref)]
     pub(super) fn serialize<S: Serializer>(level: &Option<Level>, to: S) -> Result<S::Ok, S::Error> {
         level.map(Level::name).serialize(to)
     }
