@@ -18,7 +18,7 @@ use super::robust::{CompetingMotion, Consensus, larger};
 use super::solver::covariance::plugged;
 use super::solver::efficient::{beyond_theory, covariance_at};
 use super::solver::finite_rotation::{settle, shift};
-use super::solver::likelihood::{Candidate, candidates, minima, near_best, smoothed};
+use super::solver::likelihood::{Candidate, choose, minima, near_best, smoothed};
 use super::solver::profile_likelihood::ProfileLikelihood;
 use super::solver::refine::{Minimum, StoppingCriteria, refine};
 use super::solver::smoothing::DepthSmoother;
@@ -101,7 +101,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     };
     let inliers = scaled.observations.subset(&kept.inliers);
     let found = Task { whitening: &whitening, options, known: Some(&kept), rng }.on(&mut scaled, inliers);
-    doubted(found, &scaled.observations)
+    doubted(found, &scaled.observations, &kept)
 }
 
 /// The inliers of one motion, judged by their own errors.
@@ -154,8 +154,8 @@ impl Task<'_, '_> {
             found =
                 found.iter().map(|minimum| refine(&inliers, minimum.motion, StoppingCriteria::of(inliers.n))).collect();
         }
-        let candidates = self.chosen(&inliers, &found);
-        let mut solution = self.solved(&inliers, &candidates);
+        let (candidates, made) = self.chosen(&inliers, &found);
+        let mut solution = self.solved(&inliers, &candidates, made);
         // Undetermined: the points were derotated about a different rotation.
         solution.described &= shift(self.whitening, &inliers, &solution.motion) <= MAX_SHIFT;
         self.inflate(&mut solution, scaled, &inliers, candidates[0].minimum.equations.cost);
@@ -206,12 +206,12 @@ impl Task<'_, '_> {
     }
 
     /// The minima in the order of preference.
-    fn chosen(&self, inliers: &Observations, found: &[Minimum]) -> Vec<Candidate> {
+    fn chosen(&self, inliers: &Observations, found: &[Minimum]) -> (Vec<Candidate>, Option<DepthSmoother>) {
         if self.options.initial.is_some() {
             let given = |minimum: &Minimum| Candidate { cost: minimum.equations.cost, minimum: *minimum };
-            return found.iter().map(given).collect();
+            return (found.iter().map(given).collect(), None);
         }
-        candidates(inliers, found)
+        choose(inliers, found, || self.smoother(inliers))
     }
 
     fn smoother(&self, inliers: &Observations) -> DepthSmoother {
@@ -220,7 +220,7 @@ impl Task<'_, '_> {
 
     /// Maximum likelihood's motion or that of the smoothed weights, which are also solved where maximum
     /// likelihood's theory does not hold.
-    fn solved(&self, inliers: &Observations, candidates: &[Candidate]) -> Solution {
+    fn solved(&self, inliers: &Observations, candidates: &[Candidate], made: Option<DepthSmoother>) -> Solution {
         let chosen = &candidates[0];
         let wanted = match self.options.method {
             Method::Auto => inliers.n >= SMOOTHED,
@@ -234,7 +234,8 @@ impl Task<'_, '_> {
         let linear = plugged.as_ref().is_some_and(|plugged| !bent && !beyond_theory(inliers, &chosen.minimum, plugged));
         let mut tried = None;
         if wanted || !linear {
-            tried = smoothed(inliers, self.options, candidates, &mut self.smoother(inliers));
+            let mut smoother = made.unwrap_or_else(|| self.smoother(inliers));
+            tried = smoothed(inliers, self.options, candidates, &mut smoother);
         }
         let (mut improved, undecided) = tried.map_or((None, None), |(best, undecided)| (Some(best), undecided));
         // Maximum likelihood alone is undetermined beyond its theory; a minimum from where smoothed weights

@@ -13,6 +13,7 @@ use crate::motion3d::model::options::MotionOptions;
 use crate::motion3d::model::result::{MotionEstimate, Status, axes, nested};
 use crate::motion3d::model::rows::{Matrix5, MidpointDepth};
 use crate::motion3d::robust;
+use crate::motion3d::robust::Consensus;
 use crate::motion3d::solver::covariance::{direction_deviation, plugged};
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -195,9 +196,18 @@ pub(crate) fn report_rotation(
     }
 }
 
-/// Points that decide alone make a motion doubtful that nothing worse is said against.
-pub(crate) fn doubted(found: MotionEstimate, all: &Observations) -> MotionEstimate {
-    let few = found.status == Status::Ok && robust::has_high_leverage(all, &found);
+/// Points that decide alone make a motion doubtful that nothing worse is said against; and a rotation alone is
+/// not known of few points whose noise is not one: larger noise may hide a translation.
+pub(crate) fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
+    let few = match found.status {
+        Status::Ok => robust::has_high_leverage(all, &found),
+        Status::RotationOnly => {
+            let inliers = found.residuals.iter().zip(&found.inliers).filter(|(_, inlier)| **inlier);
+            kept.doubtful || !robust::one_noise(inliers.map(|(rest, _)| *rest))
+        }
+        Status::LowSnr => kept.doubtful,
+        _ => false,
+    };
     if few { MotionEstimate { status: Status::FewPoints, ..found } } else { found }
 }
 

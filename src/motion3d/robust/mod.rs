@@ -30,7 +30,7 @@ use crate::motion3d::solver::starts::at_most;
 use competing_motions::{among_many_outliers, competing_motions, hidden_object, second};
 use depth_consistency::{Cells, DepthConsistency};
 pub(crate) use leverage::has_high_leverage;
-pub(crate) use noise::{CUT_INFORMATION, larger};
+pub(crate) use noise::{CUT_INFORMATION, larger, one_noise};
 use outlier_posterior::OutlierPosterior;
 pub(crate) use outlier_posterior::weighted_by_posterior;
 use search::{graduated, robust_motions};
@@ -91,6 +91,8 @@ pub(crate) struct Consensus {
     /// Other motions with about as many inliers, and how much more each costs, in squared units of noise;
     /// the best first.
     pub competing: Vec<CompetingMotion>,
+    /// Whether few points may have outliers that are not believed.
+    pub doubtful: bool,
     /// Whether so many outliers fit by chance that least squares on all inliers would follow them.
     pub many: bool,
     /// Probability that points are outliers that fit by chance; `None` if unknown.
@@ -99,7 +101,7 @@ pub(crate) struct Consensus {
 
 impl Consensus {
     fn new(motion: Motion, inliers: Vec<u32>) -> Self {
-        Self { motion, inliers, competing: Vec::new(), many: false, outliers: None }
+        Self { motion, inliers, competing: Vec::new(), doubtful: false, many: false, outliers: None }
     }
 }
 
@@ -131,9 +133,11 @@ fn with_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -
     scaled.take(noise::FIRST_SHARE * scaled.observations.median_flow());
     let found = in_noise(whitening, scaled, true, rng)?;
     let Some(noise_std) = single_noise.map(|noise_std| noise_std / scaled.noise_std) else { return Some(found) };
-    if noise::shortening(&scaled.observations, &found, noise_std) < SURE {
+    let shorter = noise::shortening(&scaled.observations, &found, noise_std);
+    if shorter < SURE {
         scaled.take(noise_std);
-        return in_noise(whitening, scaled, false, rng);
+        let found = in_noise(whitening, scaled, false, rng)?;
+        return Some(Consensus { doubtful: shorter > 0.0, ..found });
     }
     Some(found)
 }

@@ -3,6 +3,7 @@
 
 use super::{Consensus, UNKNOWNS};
 use crate::ablation::keeps;
+use crate::math::median;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
@@ -73,6 +74,18 @@ pub(crate) fn noise_std(whitening: &Whitening<'_>, observations: &Observations, 
     let best = found.first()?.equations.cost;
     let degrees = observations.n.saturating_sub(UNKNOWNS).max(1);
     Some((best / degrees as f64).sqrt()).filter(|noise_std| noise_std.is_finite() && *noise_std > 0.0)
+}
+
+/// By how much the mean square may exceed what the median says of it.
+const TAILS: f64 = 1.5;
+
+/// Whether the lengths of two-dimensional residuals are those of one normal
+/// distribution: few of points that are many times as large as most would make their mean square larger than
+/// their median has it, which is `2 ln 2` variances where the mean is two.
+pub(crate) fn one_noise(residuals: impl Iterator<Item = f64>) -> bool {
+    let mut squares: Vec<f64> = residuals.map(|rest| rest * rest).collect();
+    let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
+    mean <= TAILS * median(&mut squares).unwrap_or(0.0) / std::f64::consts::LN_2
 }
 
 /// By how much, in nats, outliers shorten the description of the residuals: that with `noise_std`, in present

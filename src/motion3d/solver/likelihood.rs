@@ -9,7 +9,7 @@ use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{depths, equations};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::options::MotionOptions;
+use crate::motion3d::model::options::{MotionOptions, Smoother};
 use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::rows::tangents;
 use rayon::prelude::*;
@@ -27,7 +27,8 @@ pub(crate) const SAME: f64 = 0.5;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Candidate {
     pub minimum: Minimum,
-    /// `J` and the depths behind the camera, in squared units of noise.
+    /// `J`, the depths behind the camera and, where it was needed, the depth map's roughness; in squared
+    /// units of noise.
     pub cost: f64,
 }
 
@@ -61,7 +62,8 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
         let fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(1)));
         let rough: Vec<Minimum> =
             starts.into_par_iter().map(|start| refine(&fewer, start, StoppingCriteria::ROUGH)).collect();
-        let mut finalists = candidates(&fewer, &different(rough));
+        let smoother = || DepthSmoother::new(&fewer, Smoother::Auto, rng.stream(6));
+        let mut finalists = choose(&fewer, &different(rough), smoother).0;
         finalists.truncate(FINALISTS);
         let followed =
             |candidate: &Candidate| refine(observations, *candidate.motion(), StoppingCriteria::of(observations.n));
@@ -91,14 +93,32 @@ fn cost_tolerance(n: usize) -> f64 {
     8.0 * (n as f64).sqrt() + 25.0
 }
 
-/// The minima with the better sign, the likeliest first.
+/// The minima in the order of preference: by `J` and depth signs; where others come close, by the smoothness
+/// of their depths, too.
 ///
 /// `J` alone is a coin toss between two minima: their residuals use different components of the noise, and
-/// differ by about `2 sqrt(n)` by chance. [`smoothed`] decides among those that come close.
-pub(crate) fn candidates(observations: &Observations, minima: &[Minimum]) -> Vec<Candidate> {
-    let mut found: Vec<Candidate> = minima.iter().map(|minimum| Candidate::signed(observations, minimum)).collect();
-    found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    found
+/// differ by about `2 sqrt(n)` by chance.
+pub(crate) fn choose(
+    observations: &Observations,
+    minima: &[Minimum],
+    smoother: impl FnOnce() -> DepthSmoother,
+) -> (Vec<Candidate>, Option<DepthSmoother>) {
+    let mut candidates: Vec<Candidate> =
+        minima.iter().map(|minimum| Candidate::signed(observations, minimum)).collect();
+    candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let Some(best) = candidates.first().map(|candidate| candidate.cost) else { return (candidates, None) };
+    let rival = |candidate: &Candidate| candidate.cost < best + cost_tolerance(observations.n);
+    let (mut rivals, others): (Vec<Candidate>, Vec<Candidate>) = candidates.iter().partition(|one| rival(one));
+    if rivals.len() < 2 {
+        return (candidates, None);
+    }
+    let smoother = smoother();
+    for candidate in &mut rivals {
+        candidate.cost += smoother.cost(&depths(observations, &candidate.minimum.motion));
+    }
+    rivals.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    rivals.extend(others);
+    (rivals, Some(smoother))
 }
 
 /// Most minima from which smoothed weights are tried.
