@@ -179,7 +179,6 @@ impl ChannelPolicy for Grey {
     }
 }
 
-/// The answer to colour input where grey is wanted.
 pub(crate) fn refuse_colour(path: &Path) -> Error {
     Error::format(
         path,
@@ -187,7 +186,6 @@ pub(crate) fn refuse_colour(path: &Path) -> Error {
     )
 }
 
-/// The answer to grey input where colour is wanted.
 fn refuse_grey(path: &Path) -> Error {
     Error::format(path, "holds grey; colour is needed (red, green and blue)")
 }

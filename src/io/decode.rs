@@ -55,7 +55,6 @@ pub fn read_image<P: ChannelPolicy>(path: impl AsRef<Path>, policy: P) -> Result
     read_one_picture(path, policy)
 }
 
-/// Whether the file's content is TIFF.
 pub(crate) fn is_tiff(path: &Path) -> Result<bool> {
     Ok(guessing_reader(path)?.format() == Some(ImageFormat::Tiff))
 }
@@ -103,7 +102,6 @@ fn read_one_picture<P: ChannelPolicy>(path: &Path, policy: P) -> Result<P::Frame
     }
 }
 
-/// A picture's file and size.
 struct Place<'a> {
     path: &'a Path,
     width: usize,
@@ -135,7 +133,6 @@ fn io_error(path: &Path, error: std::io::Error) -> Error {
     }
 }
 
-/// As for other images.
 pub(crate) fn png_error(path: &Path, error: png::DecodingError) -> Error {
     match error {
         png::DecodingError::IoError(error) => io_error(path, error),

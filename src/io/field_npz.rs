@@ -280,7 +280,6 @@ fn read_points<R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<Vec<(usize, usi
     points.ok_or_else(|| npz.wrong("points", "holds a negative coordinate"))
 }
 
-/// What the arrays of a field must measure.
 #[derive(Clone, Copy)]
 struct Shape {
     p: usize,

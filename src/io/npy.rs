@@ -52,7 +52,6 @@ impl ElementType {
         }
     }
 
-    /// The type and whether it is big-endian.
     fn parse(descriptor: &str) -> Option<(Self, bool)> {
         let (order, rest) = match descriptor.chars().next()? {
             c @ ('<' | '>' | '|' | '=') => (c, &descriptor[1..]),

@@ -220,7 +220,6 @@ impl<R: Read + Seek> NpzReader<R> {
         Ok((header, bytes))
     }
 
-    /// An error about the array `name`.
     pub(crate) fn wrong(&self, name: &str, what: &str) -> Error {
         Error::format(&self.path, format!("array '{name}' {what}"))
     }

@@ -15,7 +15,6 @@ pub struct TableWriter {
     columns: usize,
 }
 
-/// Where the rows go.
 enum Target {
     File(AtomicFile),
     Stream(Box<dyn Write + Send>),

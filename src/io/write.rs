@@ -27,16 +27,11 @@ enum Inner {
 #[derive(Debug)]
 struct Temporary(Option<NamedTempFile>);
 
-/// A folder under a temporary name inside another one, for files that are to appear together; it goes, with
-/// what is left in it, when this is dropped.
+/// A temporary folder for files that are to appear together; removed with what is left in it on drop.
 #[derive(Debug)]
 pub(crate) struct TemporaryFolder(TempDir);
 
 impl TemporaryFolder {
-    /// Makes one.
-    ///
-    /// # Errors
-    /// [`Error::Io`] with `folder` when that may not be written.
     pub fn inside(folder: &Path) -> Result<Self> {
         let mut names = temporaries();
         let made = tempfile::Builder::new().prefix(".jacoflow-").suffix(".part").tempdir_in(folder);
@@ -64,9 +59,8 @@ fn temporaries() -> MutexGuard<'static, Vec<PathBuf>> {
     TEMPORARIES.get().lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes every temporary file and folder of this process (a second Ctrl-C does not unwind).
-///
-/// While the returned guard lives no other thread can begin or name a file: keep it to the end.
+/// Removes every temporary file and folder of this process (a second Ctrl-C does not unwind). While the
+/// returned guard lives no other thread can begin or name a file: keep it to the end.
 #[must_use = "files made after the guard is dropped are not removed"]
 pub(crate) fn remove_temporaries() -> impl Drop {
     let mut names = temporaries();
@@ -89,7 +83,6 @@ impl Temporary {
         self.0.as_mut().ok_or_else(|| io::ErrorKind::NotFound.into())
     }
 
-    /// Renames the file to `target`.
     fn persist(mut self, target: &Path) -> io::Result<()> {
         self.end(|file| file.persist(target).map(drop).map_err(|e| e.error))
     }

@@ -34,7 +34,6 @@ impl Coding {
         Self { bits, full_range }
     }
 
-    /// Largest code.
     fn top(self) -> f64 {
         f64::from((1_u32 << self.bits) - 1)
     }

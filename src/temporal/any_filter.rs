@@ -204,7 +204,6 @@ impl AnyFlowFilter {
     }
 }
 
-/// Whether a saved filter works in double precision.
 fn is_double<R: Read + Seek>(mut reader: NpzReader<R>) -> Result<bool> {
     let saved = SavedFilter::describe(&mut reader)?;
     Ok(saved.is_some_and(|saved| saved.precision == f64::DTYPE))

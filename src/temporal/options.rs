@@ -235,7 +235,6 @@ impl FlowFilterOptions {
         }
     }
 
-    /// Whether the square root takes the motion first.
     pub(super) fn motion_first(&self) -> bool {
         self.form == FilterForm::Fast || self.square_root == Some(SquareRoot::MotionFirst)
     }
@@ -296,7 +295,6 @@ mod saved_level {
     use super::{Deserialize, Level, Serialize};
     use serde::{Deserializer, Serializer};
 
-    // Serde passes references.
     #[allow(clippy::ref_option, clippy::trivially_copy_pass_by_ref)]
     pub(super) fn serialize<S: Serializer>(level: &Option<Level>, to: S) -> Result<S::Ok, S::Error> {
         level.map(Level::name).serialize(to)

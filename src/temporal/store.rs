@@ -22,7 +22,6 @@ pub(super) struct Store<T> {
 }
 
 impl<T: SimdReal> Store<T> {
-    /// States of filters that start.
     pub(super) fn new(
         frame_size: (usize, usize),
         options: &FlowFilterOptions,

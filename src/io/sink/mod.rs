@@ -83,7 +83,6 @@ fn kind_of(spec: &str) -> Result<&'static Kind> {
 struct Uniform(Option<((usize, usize), &'static str)>);
 
 impl Uniform {
-    /// Whether this is the first frame; an error for one unlike the first.
     fn check(&mut self, frame: &impl FrameFormat) -> Result<bool> {
         let this = (frame.size(), frame.dtype());
         match self.0 {

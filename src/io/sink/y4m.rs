@@ -66,7 +66,6 @@ impl Y4mSink {
         Self { output, path, rate: ratio(frame_rate), uniform: Uniform::default() }
     }
 
-    /// Adds a frame in a layout; `planes` are its bytes.
     fn put(&mut self, frame: &impl FrameFormat, layout: &str, planes: &[u8]) -> Result<()> {
         let first = self.uniform.check(frame)?;
         let ((w, h), (a, b)) = (frame.size(), self.rate);

@@ -115,7 +115,6 @@ impl Running {
         String::from_utf8_lossy(&text).trim().to_string()
     }
 
-    /// Puts the program's own words in front of an error that its output caused.
     fn explain(&mut self, path: &Path, error: Error) -> Error {
         let _ = self.child.kill();
         let _ = self.child.wait();

@@ -13,7 +13,6 @@ pub(super) const KIND: Kind = Kind {
     open_colour: |spec, policy| Ok(Box::new(FilesSource::new(matches(spec)?, policy)?)),
 };
 
-/// The image files that match, in natural order.
 fn matches(pattern: &str) -> Result<Vec<PathBuf>> {
     let paths = glob::glob(pattern)
         .map_err(|e| Error::argument("frames", "a pattern of * ? [..] **", format!("{pattern} ({e})")))?;

@@ -104,7 +104,6 @@ impl<P: ChannelPolicy> NpySource<P> {
         self.width * self.height * self.channels * self.header.element.size()
     }
 
-    /// One frame, stored in one piece.
     fn read_frame(&mut self) -> Result<P::Frame> {
         let length = self.frame_bytes();
         let at = self.data_start + self.next as u64 * length as u64;

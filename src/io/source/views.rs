@@ -36,12 +36,10 @@ impl ViewLayout {
         Ok(if self.squeezed() { views.map(|view| stretched(&view, beside)) } else { views })
     }
 
-    /// Whether the views stand beside one another.
     fn beside(self) -> bool {
         matches!(self, Self::SideBySide | Self::HalfSideBySide)
     }
 
-    /// Whether they were squeezed.
     fn squeezed(self) -> bool {
         matches!(self, Self::HalfSideBySide | Self::HalfTopBottom)
     }
@@ -141,7 +139,6 @@ impl ViewPairs {
     }
 }
 
-/// Both views of a frame that holds them.
 fn halves(frame: &AnyFrame, layout: ViewLayout) -> Result<[AnyFrame; 2]> {
     match frame {
         AnyFrame::U8(frame) => Ok(layout.cut(frame)?.map(AnyFrame::U8)),

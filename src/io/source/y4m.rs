@@ -124,7 +124,6 @@ impl<R, P> Y4mSource<R, P> {
 }
 
 impl<R: BufRead, P: ChannelPolicy> Y4mSource<R, P> {
-    /// Bytes of both chroma planes together.
     fn chroma_bytes(&self) -> usize {
         let (width, height) = self.layout.chroma_size(self.width, self.height);
         2 * width * height * self.layout.sample_bytes()
@@ -155,7 +154,6 @@ impl<R: BufRead, P: ChannelPolicy> Y4mSource<R, P> {
         Ok(chroma)
     }
 
-    /// The code values in the bytes of a plane.
     fn codes<'a>(&self, bytes: &'a [u8]) -> impl Iterator<Item = u16> + use<'a, R, P> {
         let size = self.layout.sample_bytes();
         bytes
@@ -200,7 +198,6 @@ impl<R: BufRead, P: ChannelPolicy> Y4mSource<R, P> {
         if bytes.len() < count { Err(self.cut_off("is cut off")) } else { Ok(bytes) }
     }
 
-    /// Reads and forgets `count` bytes.
     fn discard(&mut self, count: usize) -> Result<()> {
         let passed = io::copy(&mut (&mut self.input).take(count as u64), &mut io::sink());
         match passed.map_err(|e| Error::io(&self.name, e))? {

@@ -144,14 +144,12 @@ impl<T: SimdReal> FlowFilter<T> {
         threads.install(|| self.field(&marks, &results))
     }
 
-    /// Which rows a block's results have.
     pub(super) fn rows(&self) -> Rows {
         let covariance = if self.options.covariance { 21 } else { 0 };
         let residual = self.options.residual.then_some(6 + covariance);
         Rows { covariance, residual, count: 6 + covariance + usize::from(residual.is_some()) }
     }
 
-    /// The result after a frame.
     fn field(&self, marks: &[Mark], results: &[T]) -> Result<FlowField<T>> {
         let options = &self.options;
         let layout = FieldLayout {

@@ -19,8 +19,6 @@ const TASK_BLOCKS: usize = 32;
 /// Blocks that pass the three kernels together: few, so that their states stay in the first-level cache.
 const PASS_BLOCKS: usize = 2;
 
-/// Passes every block through measurement, prediction and update.
-///
 /// The kernels are compiled here, for both precisions, and not again in every crate that uses a filter: hence
 /// functions that are not generic, with [`Any`] between them.
 #[allow(clippy::ptr_arg)] // A slice is no `Any`.
@@ -110,7 +108,6 @@ pub(super) const PAIRS: [(usize, usize); 21] = {
     pairs
 };
 
-/// Inputs that the blocks of a frame share.
 struct Pass<'a, T> {
     frame: &'a Frame<T>,
     fit: &'a Fit<T>,
@@ -124,7 +121,6 @@ struct Pass<'a, T> {
 }
 
 impl<T: SimdReal> Pass<'_, T> {
-    /// Measurement, prediction and update of a few blocks.
     fn run(&self, blocks: &mut [T], pixels: &[usize], marks: &mut [Mark], results: &mut [T]) {
         let Self { frame, fit, constants, decorrelation, rows, level, scale, .. } = *self;
         let zero = T::from_f64(0.0);

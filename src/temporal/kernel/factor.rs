@@ -7,10 +7,8 @@ use crate::simd::{Lanes, SimdReal};
 /// The columns of a factor, zero above its diagonal: `columns[k][state index]`.
 pub(super) type Columns<V> = [[V; N]; N];
 
-/// Factors `cov`, taking the state's components in `order`, into columns whose upper part is zero already.
-/// The result is one in each lane whose pivots were all positive.
-///
-/// Columns left to right; each is held in registers while the earlier ones are subtracted.
+/// Factors `cov`, with the state in `order`, left to right into columns whose upper part is zero already.
+/// Returns one in each lane whose pivots were all positive.
 #[inline(always)]
 pub(super) fn factor<V: Lanes>(cov: &[V; PACKED], order: &[usize; N], columns: &mut Columns<V>) -> V {
     let mut ok = V::constant(1.0);

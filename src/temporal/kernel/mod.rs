@@ -68,7 +68,6 @@ pub(super) struct Lane<V> {
 }
 
 impl<V: Lanes> Lane<V> {
-    /// Reads the pixels `at ..` of a block.
     #[inline(always)]
     pub(super) fn load(block: &[V::Scalar], at: usize) -> Self {
         let mut lane = Self { mean: [V::zero(); N], cov: [V::zero(); PACKED] };
@@ -82,7 +81,6 @@ impl<V: Lanes> Lane<V> {
         lane
     }
 
-    /// Writes them back.
     #[inline(always)]
     pub(super) fn store(&self, block: &mut [V::Scalar], at: usize) {
         let rows = &mut block[..PLANES * BLOCK];

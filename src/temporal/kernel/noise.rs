@@ -12,7 +12,6 @@ use super::vector::{plus_times, times};
 use super::{Constants, PACKED, packed};
 use crate::simd::Lanes;
 
-/// Contributions of the noise pairs.
 pub(super) struct NoisePairs<V> {
     /// Full vectors of weight one: three of the Hessian's noise, odd and even parts of four derivatives'.
     pub full: [[V; 6]; 11],

@@ -95,11 +95,8 @@ impl<T: SimdReal> Kernel<T> for Update<'_, T> {
     }
 }
 
-/// The update of one vector of pixels.
-///
-/// Only the brightness block has to be worked through component by component; what that does to one column of
-/// the other blocks is the same six elimination steps, done with the column in registers, and the motion
-/// block takes all six at once.
+/// Only the brightness block is updated component by component; columns of the other blocks take the same six
+/// elimination steps in registers, and the motion block takes all six at once.
 #[inline(always)]
 fn update<V: Lanes>(lane: &mut Lane<V>, jet: &mut [V; 6], present: V, decorrelation: &Decorrelation<V::Scalar>) {
     let steps = &decorrelation.steps;
@@ -228,9 +225,8 @@ impl<V: Lanes> Elimination<V> {
     }
 }
 
-/// Updates mean and covariance of the brightness with six components of variances `r`.
-///
-/// A component's own row is multiplied by `r / s`: subtraction without the cancellation.
+/// Updates mean and covariance of the brightness with six components of variances `r`. A component's own row
+/// is multiplied by `r / s`: no cancellation.
 #[inline(always)]
 fn brightness_block<V: Lanes>(lane: &mut Lane<V>, jet: &[V; 6], present: V, r: &[V::Scalar; 6]) -> Elimination<V> {
     let (zero, missing) = (V::zero(), V::constant(1.0) - present);

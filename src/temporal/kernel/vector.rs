@@ -3,7 +3,6 @@
 
 use crate::simd::Lanes;
 
-/// `y factor`.
 #[inline(always)]
 pub(super) fn times<V: Lanes, const K: usize>(y: &[V; K], factor: V) -> [V; K] {
     let mut out = *y;
@@ -13,7 +12,6 @@ pub(super) fn times<V: Lanes, const K: usize>(y: &[V; K], factor: V) -> [V; K] {
     out
 }
 
-/// `a + b`.
 #[inline(always)]
 pub(super) fn plus<V: Lanes, const K: usize>(a: &[V; K], b: &[V; K]) -> [V; K] {
     let mut out = *a;
@@ -23,7 +21,6 @@ pub(super) fn plus<V: Lanes, const K: usize>(a: &[V; K], b: &[V; K]) -> [V; K] {
     out
 }
 
-/// `a - b`.
 #[inline(always)]
 pub(super) fn minus<V: Lanes, const K: usize>(a: &[V; K], b: &[V; K]) -> [V; K] {
     let mut out = *a;
@@ -33,7 +30,6 @@ pub(super) fn minus<V: Lanes, const K: usize>(a: &[V; K], b: &[V; K]) -> [V; K] 
     out
 }
 
-/// `a + factor b`.
 #[inline(always)]
 pub(super) fn plus_times<V: Lanes, const K: usize>(a: &[V; K], factor: V, b: &[V; K]) -> [V; K] {
     let mut out = *a;

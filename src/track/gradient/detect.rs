@@ -24,14 +24,12 @@ const EDGE_WIDTH: f64 = 3.0;
 const MIN_PIXELS: usize = 8;
 /// Farthest displacement from frame to frame, px.
 const MAX_DISPLACEMENT: isize = 10;
-/// Of displacements whose cost is within this factor of the best, or that leave no more than so many times
-/// the noise, the smallest is taken: larger ones explain an even target as well. Noise alone leaves 1.13
-/// times.
+/// Cost ratio, and residual over the noise, of displacements that count as equal: the smallest is taken,
+/// since larger ones explain an even target as well. Noise alone leaves 1.13.
 const EQUAL_COST: (f64, f64) = (1.05, 1.4);
 /// Difference that all larger ones count as, grey levels.
 const MAX_DIFFERENCE: f64 = 40.0;
-/// Pixels of an object that judge a displacement, about: of larger ones every second along both axes, every
-/// third ...
+/// Maximum number of pixels, about, that judge a displacement; larger objects are subsampled.
 const VOTES: f64 = 4096.0;
 /// Smallest side of what is found, px.
 const MIN_SIDE: f64 = 3.0;
@@ -64,8 +62,7 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
     let object = objects.swap_remove(chosen);
     let between = half_a_pixel_around(first);
     let explain = |object: &[(usize, usize)]| displacement(&between, second, object, noise);
-    // What an even target uncovers and what it covers lie apart by its length: together they are
-    // explained without a rest.
+    // An even target uncovers and covers areas apart by its length: both together leave no residual.
     let whole = objects
         .iter()
         .filter(|other| crate::ablation::keeps("gradient.detect_ends") && are_ends(&object, other))
@@ -87,7 +84,6 @@ pub fn detect_moving_target(first: &Frame<f64>, second: &Frame<f64>, near: Optio
         .then_some(MovingTarget { bounds, displacement: displacement.map(|d| d as f64) })
 }
 
-/// Pixels that differ by more than noise makes them.
 fn changed(first: &Frame<f64>, second: &Frame<f64>, noise: f64) -> Frame<bool> {
     let bar = CHANGE * noise * std::f64::consts::SQRT_2;
     Frame::from_fn(first.width(), first.height(), |x, y| (second.get(x, y) - first.get(x, y)).abs() > bar)
@@ -103,8 +99,7 @@ pub(super) fn camera_moved(first: &Frame<f64>, second: &Frame<f64>) -> bool {
     count as f64 > MIN_CAMERA_CHANGE * changed.data().len() as f64
 }
 
-/// Whether two groups of changed pixels may be the ends of one object: they have nearly the same extent along
-/// x or along y.
+/// Whether two groups may be the ends of one object: nearly the same extent along x or along y.
 fn are_ends(a: &[(usize, usize)], b: &[(usize, usize)]) -> bool {
     let [a, b] = [a, b].map(|object| bounds(extent(object), [0, 0]));
     let alike = |a: [f64; 2], b: [f64; 2]| {
@@ -114,8 +109,7 @@ fn are_ends(a: &[(usize, usize)], b: &[(usize, usize)]) -> bool {
     alike([a.x, a.width], [b.x, b.width]) || alike([a.y, a.height], [b.y, b.height])
 }
 
-/// Whether two groups of changed pixels that lie apart along an axis are as thick there as their object
-/// moved: two objects that move alike are thicker.
+/// Whether two groups apart along an axis are as thick as their object moved; two objects are thicker.
 fn are_as_thick(a: &[(usize, usize)], b: &[(usize, usize)], displacement: [isize; 2]) -> bool {
     let (a, b) = (extent(a), extent(b));
     (0..2).filter(|&k| a[k][1] < b[k][0] || b[k][1] < a[k][0]).all(|k| {
@@ -124,7 +118,6 @@ fn are_as_thick(a: &[(usize, usize)], b: &[(usize, usize)], displacement: [isize
     })
 }
 
-/// Indices next to one, and itself, of `length`.
 fn around(at: usize, length: usize) -> std::ops::Range<usize> {
     at.saturating_sub(1)..(at + 2).min(length)
 }
@@ -140,8 +133,7 @@ fn crowded(changed: &Frame<bool>) -> Frame<bool> {
     Frame::from_fn(width, height, |x, y| changed.get(x, y) && count(&middle, x, y) > 0)
 }
 
-/// Pixels that belong together, gaps of a few pixels included: squares of pixels that hold changed ones, and
-/// at most one empty square between them.
+/// Groups of changed pixels: occupied cells with at most one empty cell between them.
 fn objects(changed: &Frame<bool>) -> Vec<Vec<(usize, usize)>> {
     let (width, height) = changed.size();
     let (columns, rows) = (width.div_ceil(CELL), height.div_ceil(CELL));
@@ -180,9 +172,8 @@ fn distance(pixels: &[(usize, usize)], at: [f64; 2]) -> f64 {
     pixels.iter().map(far).sum::<f64>() / pixels.len() as f64
 }
 
-/// The smallest displacement that explains the changed pixels nearly best, and what is left then, grey
-/// levels: their extent less the displacement holds what was there in the first frame, `between` these levels
-/// within half a pixel.
+/// Smallest displacement that explains the changed pixels nearly best, and the residual, grey levels.
+/// `between`: brightness range of the first frame within half a pixel.
 fn displacement(
     between: &Frame<[f64; 2]>,
     second: &Frame<f64>,
@@ -219,7 +210,6 @@ fn read<T: Copy>(frame: &Frame<T>, x: isize, y: isize) -> Option<T> {
     inside.then(|| frame.get(x as usize, y as usize))
 }
 
-/// Least and greatest column and row of the changed pixels.
 fn extent(object: &[(usize, usize)]) -> [[usize; 2]; 2] {
     let none = [usize::MAX, 0];
     object.iter().fold([none; 2], |[[left, right], [top, bottom]], &(x, y)| {
@@ -227,8 +217,7 @@ fn extent(object: &[(usize, usize)]) -> [[usize; 2]; 2] {
     })
 }
 
-/// What of the changed pixels' extent is the object in the second frame: it was at one end of them and is at
-/// the other.
+/// Extent of the object in the second frame: the other end of the changed pixels than in the first.
 fn bounds([columns, rows]: [[usize; 2]; 2], displacement: [isize; 2]) -> TargetBox {
     let along = |[low, high]: [usize; 2], moved: isize| {
         let (low, high) = (low as f64 - 0.5, high as f64 + 0.5);

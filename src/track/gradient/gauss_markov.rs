@@ -99,8 +99,7 @@ impl GaussMarkovFilter {
     /// of freedom as numbers were measured.
     pub fn innovation(&self, z: &Measurement) -> f64 {
         let mut after = self.clone();
-        // The innovations of rows taken one after the other are independent, and their squares add up to that
-        // of all.
+        // Innovations of sequential scalar updates are independent: their squares sum to the total.
         (0..2).map(|axis| after.update_axis(axis, z)).sum()
     }
 

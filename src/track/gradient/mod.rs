@@ -31,7 +31,6 @@ use layered::State;
 use reference::{LocalLoop, ReferenceOptions, SearchWindow};
 use start::Waiting;
 
-/// What follows the target.
 #[derive(Debug, Clone)]
 enum Method {
     Layered(GradientOptions),
@@ -40,7 +39,6 @@ enum Method {
 }
 
 impl Method {
-    /// What the camera may do until the target moves.
     fn camera(&self) -> CameraMotion {
         match self {
             Self::Layered(options) => options.camera,
@@ -49,7 +47,6 @@ impl Method {
         }
     }
 
-    /// Begins with a box in a frame.
     fn begin(&self, frame: &Frame<f64>, bounds: TargetBox) -> (TrackState, Engine) {
         let (covariance, engine) = match self {
             Self::Layered(options) => {
@@ -66,7 +63,6 @@ impl Method {
     }
 }
 
-/// The method at work.
 #[derive(Debug)]
 enum Engine {
     Waiting(Waiting),

@@ -5,8 +5,7 @@ use crate::image::Interpolation;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
 
-/// A frame read at `(x + shift, y + shift)` by cubic convolution; NaN where that needs pixels beyond the
-/// frame.
+/// A frame read at `(x + shift, y + shift)` by cubic convolution; NaN where a tap is outside the frame.
 pub(super) fn shifted(frame: &Frame<f64>, shift: [f64; 2]) -> Frame<f64> {
     if shift == [0.0; 2] {
         return frame.clone();
@@ -15,7 +14,6 @@ pub(super) fn shifted(frame: &Frame<f64>, shift: [f64; 2]) -> Frame<f64> {
     Frame::new(width, height, shifted_into(Vec::new(), frame, shift)).unwrap_or_default()
 }
 
-/// The same in memory that was used before.
 pub(super) fn shifted_into(mut memory: Vec<f64>, frame: &Frame<f64>, shift: [f64; 2]) -> Vec<f64> {
     memory.clear();
     memory.resize(frame.data().len(), f64::NAN);
@@ -80,7 +78,6 @@ impl Taps {
         self.weights.last().map_or(0, |tap| tap.0)
     }
 
-    /// Pixels whose taps are all among `length`.
     fn range(&self, length: usize) -> std::ops::Range<usize> {
         let length = length as isize;
         let first = (-self.whole - self.first() as isize).clamp(0, length);
@@ -88,12 +85,10 @@ impl Taps {
         first as usize..end as usize
     }
 
-    /// Where the tap `k` of a pixel is.
     fn from(&self, at: usize, k: usize) -> usize {
         (at as isize + self.whole + k as isize).max(0) as usize
     }
 
-    /// The weighted sum of the taps' rows of values.
     #[inline(always)]
     fn add<'a>(&self, target: &mut [f64], row: impl Fn(usize) -> &'a [f64]) {
         if let [(a, wa), (b, wb), (c, wc), (d, wd)] = self.weights[..] {
@@ -110,8 +105,7 @@ impl Taps {
     }
 }
 
-/// Least and greatest brightness within half a pixel along either axis: displacements are whole pixels,
-/// objects do not move by those.
+/// Brightness range within half a pixel: displacements are whole pixels, true motions are not.
 pub(super) fn half_a_pixel_around(frame: &Frame<f64>) -> Frame<[f64; 2]> {
     let (width, height) = frame.size();
     Frame::from_fn(width, height, |x, y| {

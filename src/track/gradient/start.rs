@@ -43,7 +43,6 @@ impl Waiting {
     }
 }
 
-/// State of a target that has not moved yet.
 pub(super) fn nothing_yet(at: [f64; 2]) -> TrackState {
     TrackState {
         status: TrackStatus::Lost,
@@ -54,7 +53,6 @@ pub(super) fn nothing_yet(at: [f64; 2]) -> TrackState {
     }
 }
 
-/// A point in the frame.
 pub(super) fn checked_point(at: [f64; 2], (width, height): (usize, usize)) -> Result<[f64; 2]> {
     // Pixels reach half a pixel beyond their centers.
     let inside = |at: f64, length: usize| at >= -0.5 && at < length as f64 - 0.5;
@@ -65,7 +63,6 @@ pub(super) fn checked_point(at: [f64; 2], (width, height): (usize, usize)) -> Re
     Err(Error::argument("center", expected, format!("({}, {})", at[0], at[1])))
 }
 
-/// Checks the first frame.
 pub(super) fn check_frame(frame: &Frame<f64>) -> Result<()> {
     let (width, height) = frame.size();
     if width < MIN_FRAME_SIDE || height < MIN_FRAME_SIDE {
@@ -88,7 +85,6 @@ pub(super) fn is_usable(frame: &Frame<f64>) -> bool {
     greatest <= GREATEST && all_finite(frame)
 }
 
-/// A box that overlaps the frame.
 pub(super) fn checked_box(bounds: TargetBox, (width, height): (usize, usize)) -> Result<TargetBox> {
     let TargetBox { x, y, width: w, height: h } = bounds;
     let got = || format!("x {x}, y {y}, width {w}, height {h}");
@@ -100,7 +96,6 @@ pub(super) fn checked_box(bounds: TargetBox, (width, height): (usize, usize)) ->
         let expected = format!("a box at most {MAX_BOX_PER_FRAME} times as large as the {width} x {height} frame");
         return Err(Error::argument("bbox", expected, got()));
     }
-    // Pixels reach half a pixel beyond their centers.
     let is_apart = |from: f64, length: f64, whole: usize| from + length <= -0.5 || from >= whole as f64 - 0.5;
     if is_apart(x, w, width) || is_apart(y, h, height) {
         return Err(Error::argument("bbox", format!("a box that overlaps the {width} x {height} frame"), got()));

@@ -60,8 +60,7 @@ impl Target {
         self.similarity = quantile(&mut similarities, SIMILARITY_QUANTILE).unwrap_or(self.similarity);
     }
 
-    /// Half of the particles take the motion of a track in the box, drawn by the probability of foreground: a
-    /// target that moves more than its particles spread is otherwise lost in its first frames.
+    /// Half of the particles take the motion of a track in the box: fast targets would be lost at the start.
     fn quick_start(&mut self, tracks: &[Track], rng: CounterRng) {
         let bounds = self.bounds();
         let inside = |track: &&Track| track.foreground > QUICK_START.1 && holds(bounds, track.previous(), 1.0, 0.0);
@@ -82,8 +81,7 @@ impl Target {
         }
     }
 
-    /// Returns to where the target was last clear, moved on to this frame: estimates made while the occluder
-    /// came in are not reliable.
+    /// Returns to the last clear place, moved on to this frame: estimates near the occluder are unreliable.
     fn return_to_clear_place(&mut self, context: &FrameContext<'_>) -> [f64; 2] {
         let mean = self.cloud.mean();
         let place = self.presence.moved_on(&context.camera);

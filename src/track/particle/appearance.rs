@@ -123,7 +123,6 @@ impl Appearance {
     }
 }
 
-/// Share of a box that lies in the picture.
 pub(super) fn visible_share([x, y, w, h]: CentredBox, (width, height): (usize, usize)) -> f64 {
     let side = |centre: f64, length: f64, size: usize| {
         let (low, high) = (centre - length / 2.0, centre + length / 2.0);

@@ -33,7 +33,6 @@ pub(super) fn colour_bins(frame: &ColourFrame<f32>, values: bool) -> Frame<u8> {
     bins
 }
 
-/// The bin of one pixel.
 #[inline]
 fn bin_of([r, g, b]: [f32; 3], values: bool) -> u8 {
     let max = r.max(g).max(b);

@@ -81,8 +81,7 @@ pub(super) struct Background {
     pub probability: Vec<f64>,
 }
 
-/// Fits the background's motion to the flow of tracks at `points`, their positions in the frame before, px.
-/// A `known` motion is not estimated.
+/// Fits the background's motion to the flow of tracks at `points`, px; a `known` motion is kept.
 pub(super) fn fit_background(
     points: &[[f64; 2]],
     flow: &[[f64; 2]],
@@ -110,7 +109,6 @@ pub(super) fn fit_background(
     Background { motion: model.motion, probability: model.probability }
 }
 
-/// Residual motion of each track.
 fn residual(motion: &CameraMotion, point: [f64; 2], flow: [f64; 2]) -> [f64; 2] {
     let c = motion.at(point);
     [flow[0] - c[0], flow[1] - c[1]]
@@ -254,8 +252,7 @@ fn weighted_affine(points: &[[f64; 2]], flow: &[[f64; 2]], weights: &[f64], orig
 mod tests {
     use super::*;
 
-    /// Tracks on a background that zooms, rolls and shifts; every fourth is on something that moves by
-    /// itself.
+    /// Tracks on a background that zooms, rolls and shifts; every fourth moves by itself.
     fn tracks(count: usize, noise: f64) -> (Vec<[f64; 2]>, Vec<[f64; 2]>, CameraMotion) {
         let rng = CounterRng::new(3);
         let truth = CameraMotion { origin: [0.0; 2], shift: [2.0, -1.0], jacobian: [[0.004, -0.003], [0.003, 0.004]] };

@@ -12,7 +12,6 @@ const START_VELOCITY: f64 = 3.0;
 /// Bounds of width and height over those at the start.
 const SIZE_RANGE: [f64; 2] = [0.25, 4.0];
 
-/// Centre, velocity and size.
 pub(super) type Particle = [f64; COMPONENTS];
 
 /// Purposes of random numbers: independent streams of one target at one frame.
@@ -36,7 +35,6 @@ pub(super) struct Cloud {
     pub weights: Vec<f64>,
 }
 
-/// Mean and noise of a cloud's first particles.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Start {
     pub mean: Particle,

@@ -25,7 +25,6 @@ const CUT_SHARE: f64 = 0.8;
 /// Number of tracks that deciding on a cut needs.
 const CUT_TRACKS: usize = 12;
 
-/// A corner and its history.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Track {
     pub id: u64,
@@ -50,7 +49,6 @@ impl Track {
     }
 }
 
-/// The corners of a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Corners {
     /// In ascending order of their ids: the older ones first.
@@ -84,11 +82,7 @@ impl Corners {
         PointPyramid::new(grey, LEVELS)
     }
 
-    /// Follows every corner into the next frame and drops those that are lost. Returns whether the scene was
-    /// cut.
-    ///
-    /// # Errors
-    /// As [`track_points`].
+    /// Follows every corner into the next frame and drops lost ones. Returns whether the scene was cut.
     pub fn follow(&mut self, before: &PointPyramid, after: &PointPyramid) -> Result<bool> {
         let points: Vec<[f64; 2]> = self.tracks.iter().map(|track| track.position).collect();
         let found = track_points(before, after, &points, None, &self.flow)?;
@@ -113,9 +107,6 @@ impl Corners {
     }
 
     /// Adds corners where there are none yet.
-    ///
-    /// # Errors
-    /// As [`corner_score`].
     pub fn top_up(&mut self, grey: &Frame<f32>) -> Result<()> {
         let existing: Vec<[f64; 2]> = self.tracks.iter().map(|track| track.position).collect();
         let score = corner_score(grey, CORNER_WINDOW)?;

@@ -20,7 +20,6 @@ const SHARED: f64 = 0.3;
 /// Other targets' boxes are grown by this to each side, px at 480 rows.
 const OTHER_MARGIN: f64 = 2.0;
 
-/// A target and its context.
 pub(super) struct Evidence<'a> {
     pub own: usize,
     pub target: &'a Target,

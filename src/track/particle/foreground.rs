@@ -35,9 +35,6 @@ pub(super) struct BackgroundFlow {
 }
 
 /// Finds the background as the heaviest component of a mixture over the flow vectors.
-///
-/// # Errors
-/// As [`fit_dirichlet`].
 pub(super) fn background_flow(flow: &[[f64; 2]], options: &ParticleOptions) -> Result<BackgroundFlow> {
     if flow.len() < MIN_CORNERS {
         return Ok(BackgroundFlow { flow: [0.0; 2], foreground: vec![0.0; flow.len()] });
@@ -69,7 +66,6 @@ fn mixture_options(floor: f64, prior: CovariancePrior, options: &ParticleOptions
     }
 }
 
-/// One component in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Gaussian {
     mean: [f64; 2],
@@ -89,13 +85,11 @@ impl Gaussian {
         }
     }
 
-    /// Largest density.
     fn peak(&self) -> f64 {
         let [xx, xy, yy] = self.precision;
         (xx * yy - xy * xy).sqrt() / std::f64::consts::TAU
     }
 
-    /// Density over the largest one.
     fn ratio(&self, [x, y]: [f64; 2]) -> f64 {
         let (dx, dy) = (x - self.mean[0], y - self.mean[1]);
         let [xx, xy, yy] = self.precision;
@@ -147,9 +141,6 @@ pub(super) struct ForegroundMap {
 
 impl ForegroundMap {
     /// The map of the tracks' foreground probabilities on a frame in grey levels.
-    ///
-    /// # Errors
-    /// As [`fit_dirichlet`] and [`felzenszwalb`].
     pub fn of_frame(
         tracks: &[Track],
         colour: &ColourFrame<f32>,
@@ -159,10 +150,7 @@ impl ForegroundMap {
         Self::new(tracks, felzenszwalb(colour, &options.segmentation(scale))?, scale, options)
     }
 
-    /// The map of the tracks' foreground probabilities on a segmented frame.
-    ///
-    /// # Errors
-    /// As [`fit_dirichlet`].
+    /// The map on a segmented frame.
     fn new(tracks: &[Track], labels: Labels, scale: f64, options: &ParticleOptions) -> Result<Self> {
         let (mut places, mut weights) = (Vec::new(), Vec::new());
         for track in tracks.iter().filter(|track| track.residual.is_some() && track.foreground > MIN_FOREGROUND) {

@@ -20,12 +20,10 @@ pub(super) fn covered_share(own: CentredBox, other: CentredBox) -> f64 {
     side(0) * side(1) / (own[2] * own[3])
 }
 
-/// Euclidean distance.
 pub(super) fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// A box of the public kind by its centre.
 pub(super) fn centred(bounds: TargetBox) -> CentredBox {
     let [x, y] = bounds.centre();
     [x, y, bounds.width, bounds.height]

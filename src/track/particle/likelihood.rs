@@ -75,7 +75,6 @@ pub(super) fn motion_density(residual: [f64; 2], velocity: [f64; 2], scale: f64)
     motion_ratio(residual, velocity, variance) / (std::f64::consts::TAU * variance)
 }
 
-/// That density over its maximum.
 fn motion_ratio(residual: [f64; 2], velocity: [f64; 2], variance: f64) -> f64 {
     let square = (residual[0] - velocity[0]).powi(2) + (residual[1] - velocity[1]).powi(2);
     (-0.5 * square / variance).exp()
@@ -133,7 +132,6 @@ pub(super) struct Factors<'a> {
     pub foreground: Option<&'a [f64]>,
 }
 
-/// Whether a centre is in a picture.
 pub(super) fn is_inside([x, y]: [f64; 2], (width, height): (usize, usize)) -> bool {
     x >= -0.5 && y >= -0.5 && x < width as f64 - 0.5 && y < height as f64 - 0.5
 }

@@ -208,7 +208,6 @@ impl ParticleOptions {
         self.scale.unwrap_or(rows as f64 / REFERENCE_ROWS)
     }
 
-    /// Options of the segmentation at a length scale.
     pub(super) fn segmentation(&self, scale: f64) -> SegmentOptions {
         let min_size = self.segment_min_size.unwrap_or((SEGMENT_AREA * scale * scale).round() as usize);
         SegmentOptions { scale: self.segment_scale, sigma: self.segment_sigma, min_size }

@@ -27,7 +27,6 @@ const HEAD: usize = 6;
 /// Bytes of the checksum.
 const TAIL: usize = 8;
 
-/// Saved state of a tracker.
 #[derive(Serialize, Deserialize)]
 struct SavedTracker {
     options: ParticleOptions,
@@ -60,7 +59,6 @@ struct SavedRecord {
     particles: Option<Vec<Particles>>,
 }
 
-/// A colour frame.
 #[derive(Serialize, Deserialize)]
 struct SavedFrame {
     width: usize,
@@ -207,7 +205,6 @@ fn damaged(got: &str) -> Error {
     Error::argument("state", "the bytes of a pickled particle tracker or step", got)
 }
 
-/// Mark, layout, content, checksum.
 fn sealed(mark: [u8; 4], content: &impl Serialize) -> Vec<u8> {
     let head = [&mark[..], &LAYOUT.to_le_bytes()].concat();
     // Only what has no known length, or an allocation, could fail.

@@ -21,7 +21,6 @@ const RETURN_FOREGROUND: f64 = 0.7;
 /// Greatest difference of its motion, px/frame at 480 rows.
 const RETURN_DIFFERENCE: f64 = 2.4;
 
-/// Prediction of one target in a frame.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Prediction {
     pub id: u64,
@@ -96,7 +95,6 @@ pub(super) fn predict_targets(
     predictions
 }
 
-/// Prediction of a target from its last estimate.
 fn predicted(target: &Target, camera: &CameraMotion) -> Prediction {
     let velocity = target.velocity();
     let place = camera.carry(target.place(), velocity);

@@ -25,7 +25,6 @@ const MIN_SIMILARITY: f64 = 0.75;
 /// Distance within which a group may belong to another target, over width and height.
 const OTHER_REACH: [f64; 2] = [1.0, 0.6];
 
-/// Where a hidden target was found again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Recovery {
     pub place: [f64; 2],

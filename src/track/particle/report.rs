@@ -22,7 +22,6 @@ const NO_WEIGHT: &str = "no particle had a weight: the estimate is the predictio
 pub(super) const REASONS: [&str; 10] =
     ["", LEFT, LOST, NOTHING_SHOWN, CUT, HIDDEN_BY_TARGET, HIDDEN, COVERED, UNLIKE, NO_WEIGHT];
 
-/// Cause of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum StepCause {
     /// Targets were given.
@@ -35,7 +34,6 @@ pub(super) enum StepCause {
     Cut,
 }
 
-/// State of the tracker in a frame.
 pub(super) struct Tracked<'a> {
     pub frame: usize,
     pub targets: &'a [Target],
@@ -44,7 +42,6 @@ pub(super) struct Tracked<'a> {
     pub before: &'a [ParticleTarget],
 }
 
-/// Assembles the step of a frame.
 pub(super) fn report(
     tracked: &Tracked<'_>,
     camera: &CameraMotion,

@@ -9,7 +9,6 @@ use super::options::ParticleOptions;
 use super::presence::Presence;
 use crate::types::Frame;
 
-/// A target with its state.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Target {
     pub id: u64,

@@ -227,7 +227,6 @@ impl ParticleTracker {
         report(&tracked, camera, predictions, cause)
     }
 
-    /// One frame.
     fn advance(&mut self, frame: &AnyColourFrame, known: Option<CameraMotion>) -> Result<()> {
         let view = View::new(frame, self.gain, self.options.uses("particle.values"));
         if view.is_empty() {

@@ -40,7 +40,6 @@ impl Default for Recognition {
     }
 }
 
-/// State of a component's track.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ComponentTrack {
     pub id: u64,
@@ -61,7 +60,6 @@ pub(super) struct ComponentTrack {
     pub spread: [f64; 2],
 }
 
-/// A visible component.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Sighting {
     pub component: usize,
@@ -86,12 +84,10 @@ const PEAK_DECAY: f64 = 0.95;
 /// Rounding tolerance of times, ordinary steps.
 const TIME_TOLERANCE: f64 = 1e-6;
 
-/// Support (share of pixels seen where the motion leads) from which a jump is accepted. An object that gets
-/// hidden jumps onto its occluder with little support; one that stops, or moves twice as far over a missing
-/// frame, has nearly full support.
+/// Support (share of pixels seen where the motion leads) from which a jump is accepted: little for one onto
+/// an occluder, nearly full for an object that stops, or moves twice as far over a missing frame.
 const FULL_SUPPORT: f64 = 0.6;
 
-/// A measured motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Measured {
     /// Cells per ordinary step.
@@ -100,7 +96,6 @@ pub(super) struct Measured {
     pub support: f64,
 }
 
-/// Motion of a component from one step to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Carried {
     /// Motion, cells per ordinary step.
@@ -109,7 +104,6 @@ pub(super) struct Carried {
     pub coasting: bool,
 }
 
-/// A lost track.
 #[derive(Debug, Clone, PartialEq)]
 struct LostTrack {
     track: ComponentTrack,
@@ -117,7 +111,6 @@ struct LostTrack {
     since: f64,
 }
 
-/// Tracks of the components, and lost tracks.
 #[derive(Debug, Clone, Default)]
 pub(super) struct TrackAssociation {
     pub live: Vec<Option<ComponentTrack>>,
@@ -132,7 +125,6 @@ fn jumps(a: [f64; 3], b: [f64; 3], cell: [f64; 3], limits: &Recognition) -> bool
 }
 
 impl TrackAssociation {
-    /// Number of a new track.
     fn new_id(&mut self) -> u64 {
         self.next += 1;
         self.next - 1
@@ -190,9 +182,8 @@ impl TrackAssociation {
         }
     }
 
-    /// An object that reappears is first seen in parts. A mostly covered track passes to a larger matching
-    /// component that has no track, a recent one, or a younger one that it outgrows; their tracks are
-    /// exchanged.
+    /// A reappearing object is first seen in parts: a mostly covered track passes to a larger matching
+    /// component without a track, with a recent one, or with a younger one that it outgrows.
     fn pass_to_larger_parts(&mut self, at: Clock, seen: &[Sighting], least: f64, limits: &Recognition) {
         for own in seen {
             let Some(track) = self.live[own.component].as_ref() else { continue };
@@ -214,9 +205,8 @@ impl TrackAssociation {
         }
     }
 
-    /// Gives each visible component without a track a lost one that matches (largest component first, then
-    /// the nearest track), with at least `least` pixels, or a new one. A component that outgrows its own
-    /// track is matched with older lost tracks as well. Then updates all positions.
+    /// Gives components of at least `least` pixels without a track a matching lost one (largest first, then
+    /// nearest) or a new one; outgrown tracks are matched with older ones. Updates all positions.
     pub fn associate(&mut self, at: Clock, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
         self.lost.retain(|track| {
             limits.is_some_and(|limits| at.now - track.since <= limits.patience as f64 + TIME_TOLERANCE)
@@ -308,7 +298,6 @@ impl ComponentTrack {
         Some(sum)
     }
 
-    /// Whether the component is larger than the track ever was.
     fn is_outgrown(&self, seen: &Sighting) -> bool {
         seen.pixels as f64 > MAX_GROWTH * self.peak
     }

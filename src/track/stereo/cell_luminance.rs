@@ -22,7 +22,6 @@ pub(super) struct CellLuminance {
     levels: Vec<i32>,
 }
 
-/// The best shift of a template.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Match {
     /// Shift `(dx, dy)`, cells.
@@ -52,7 +51,6 @@ impl CellLuminance {
         Self::of_means((columns as i32, rows as i32), means, (LUMINANCE_LEVELS as f64 / 256.0, LUMINANCE_LEVELS))
     }
 
-    /// Means cut down to levels.
     fn of_means((columns, rows): (i32, i32), means: Vec<f64>, scale: (f64, usize)) -> Self {
         let highest = scale.1 as f64 - 1.0;
         let level = |mean: &f64| {
@@ -68,7 +66,6 @@ impl CellLuminance {
         Self::of_means((self.columns, self.rows), means, self.scale)
     }
 
-    /// Level at a cell, where it is in the picture and has one.
     fn level(&self, x: i32, y: i32) -> Option<i32> {
         let inside = (0..self.columns).contains(&x) && (0..self.rows).contains(&y);
         if !inside {
@@ -77,9 +74,8 @@ impl CellLuminance {
         Some(self.levels[(y * self.columns + x) as usize]).filter(|&level| level != NONE)
     }
 
-    /// Moves the template, cells of `self`, over `next`, up to `reach` cells along x and y: the shift with
-    /// the least mean absolute difference over what stays in the picture, at least half of it (29). The
-    /// shorter one of equals; `None` where no shift keeps half.
+    /// Shift of the template (cells of `self`) over `next`, up to `reach`, with the least mean absolute
+    /// difference (29) over at least half of it; the shorter of equals, `None` if no shift keeps half.
     pub fn find(&self, template: &[[u16; 2]], next: &Self, reach: i32) -> Option<Match> {
         let cells: Vec<(i32, i32, i32)> = template
             .iter()

@@ -6,7 +6,6 @@ use super::lucas_kanade::SmoothedLevels;
 use super::overlap::{Row, depth_motion};
 use rayon::prelude::*;
 
-/// A step as measured by the tracker.
 #[derive(Debug, Clone)]
 pub(super) struct ObservedStep {
     pub clusters: Clusters,

@@ -4,7 +4,6 @@ use super::clusters::Clusters;
 use crate::math::median;
 use crate::types::AffineFlow;
 
-/// A motion in the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PlaneMotion {
     /// Flow and derivatives at the centre.
@@ -23,7 +22,6 @@ impl PlaneMotion {
     }
 }
 
-/// Motion of a cluster to fractions of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct ClusterMotion {
     pub plane: PlaneMotion,
@@ -96,7 +94,6 @@ pub(super) fn middle(pixels: &[[f64; 2]]) -> [f64; 2] {
     })
 }
 
-/// Places `(x, y)` of a cluster's pixels, px.
 pub(super) fn places(clusters: &Clusters, k: usize) -> Vec<[f64; 2]> {
     let place = |&i: &u32| {
         let [x, y, _] = clusters.points.at(i as usize);

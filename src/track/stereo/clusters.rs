@@ -85,7 +85,6 @@ impl Clusters {
     }
 }
 
-/// Puts the value of each component at its new number.
 fn reordered<T>(values: Vec<T>, names: &[usize]) -> Vec<T> {
     let mut named: Vec<(usize, T)> = names.iter().copied().zip(values).collect();
     named.sort_by_key(|(name, _)| *name);

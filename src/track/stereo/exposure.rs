@@ -21,8 +21,7 @@ const SAMPLE_STEP: usize = 4;
 const QUANTILES: usize = 9;
 /// Unsaturated brightness, grey levels.
 const UNSATURATED: std::ops::Range<f64> = 2.0..253.0;
-/// Smallest number of pixels for an estimate, and smallest standard deviation of their brightness, grey
-/// levels.
+/// Smallest number of pixels for an estimate, and smallest standard deviation, grey levels.
 const MIN_SAMPLES_AND_STD: (usize, f64) = (50, 4.0);
 /// Largest number of pixels taken from a cluster.
 const MAX_CLUSTER_SAMPLES: usize = 200;
@@ -48,7 +47,6 @@ impl Exposure {
         frame.map(|value| gain * value + offset)
     }
 
-    /// Largest difference from another exposure at the compared levels, grey levels.
     fn difference(&self, other: &Self) -> f64 {
         let of = |level: f64| ((self.gain - other.gain) * level + self.offset - other.offset).abs();
         COMPARED_LEVELS.into_iter().map(of).fold(0.0, f64::max)
@@ -77,8 +75,7 @@ impl Exposure {
             .unwrap_or(Self::SAME)
     }
 
-    /// Robust line through the brightness of corresponding pixels. `None` for too few pixels or too little
-    /// contrast.
+    /// Robust line through corresponding brightness; `None` for too few pixels or too little contrast.
     fn of_pairs(pairs: &[[f64; 2]]) -> Option<Self> {
         let inside = |pair: &&[f64; 2]| pair.iter().all(|value| UNSATURATED.contains(value));
         let pairs: Vec<[f64; 2]> = pairs.iter().filter(inside).copied().collect();

@@ -73,7 +73,6 @@ pub struct TrackGraph {
     arcs: BTreeMap<(usize, usize, usize), Arc>,
 }
 
-/// Serialised form of a graph.
 #[derive(Serialize, Deserialize)]
 struct Written {
     format: String,
@@ -81,7 +80,6 @@ struct Written {
     arcs: Vec<Arc>,
 }
 
-/// Format name of a serialised graph.
 const FORMAT: &str = "jacoflow track graph 1";
 
 impl TrackGraph {
@@ -123,7 +121,6 @@ impl TrackGraph {
         self.nodes.get(&(time, index))
     }
 
-    /// The cluster, mutable.
     pub(super) fn node_mut(&mut self, time: usize, index: usize) -> Option<&mut Node> {
         self.nodes.get_mut(&(time, index))
     }

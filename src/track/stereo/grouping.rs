@@ -27,7 +27,6 @@ impl Grouping {
     }
 }
 
-/// Motion of a cluster, as grouping needs it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct GroupMotion {
     /// `(u, v, u_x, v_x, u_y, v_y)` at `centre`.

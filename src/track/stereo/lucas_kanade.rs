@@ -33,7 +33,6 @@ const FINE: usize = LEVEL_SIGMAS.len() - 1;
 /// Truncation of residuals in comparisons, grey levels.
 const MAX_RESIDUAL: f64 = 30.0;
 
-/// A frame smoothed at every level.
 #[derive(Debug, Clone)]
 pub(super) struct SmoothedLevels([Frame<f32>; LEVEL_SIGMAS.len()]);
 
@@ -63,11 +62,8 @@ impl SmoothedLevels {
     }
 }
 
-/// Estimates the motion of pixels `(x, y)` between two smoothed frames from several starts of the
-/// translation, px; the smallest truncated residual wins.
-///
-/// `None` for fewer than three pixels, if fewer than half of them stay in the view, or for singular
-/// equations.
+/// Motion of pixels `(x, y)` between two smoothed frames; of several starts, px, the smallest truncated
+/// residual wins. `None` for under three pixels, under half of them in view, or singular equations.
 pub(super) fn affine_motion(
     before: &SmoothedLevels,
     after: &SmoothedLevels,

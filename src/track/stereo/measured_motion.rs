@@ -18,7 +18,6 @@ const MIN_SHARE: f64 = 0.15;
 /// Largest difference of agreeing changes of disparity from their mean, layers.
 const AGREEING: f64 = 0.5;
 
-/// The next view before it is clustered.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NextView<'a> {
     pub luminance: &'a CellLuminance,
@@ -45,12 +44,9 @@ impl<'a> LastView<'a> {
     }
 }
 
-/// Motion of all clusters with at least `least` pixels towards the next view by affine Lucas-Kanade, from the
-/// template shift (up to `reach` cells) and from a guess, px, each. A change of exposure is applied to the
-/// last view first.
-///
-/// Depth: robust mean of the disparity at the moved pixels less the old one. `None` where views or
-/// disparities do not determine the motion, or beyond `reach`.
+/// Motion of all clusters of at least `least` pixels towards the next view, from the template shift (up to
+/// `reach` cells) and from a guess, px. A change of exposure is applied to the last view first. Depth: robust
+/// mean of the disparity change. `None` where undetermined, or beyond `reach`.
 pub(super) fn measure_motions(
     from: &ObservedStep,
     next: NextView<'_>,
@@ -77,7 +73,6 @@ pub(super) fn measure_motions(
     (0..from.clusters.components()).into_par_iter().map(one).collect()
 }
 
-/// Motion in the picture of all clusters with at least `least` pixels.
 fn plane_motions(
     last: &LastView<'_>,
     next: NextView<'_>,
@@ -114,7 +109,6 @@ fn depth_change(clusters: &Clusters, k: usize, plane: &PlaneMotion, disparity: &
     Some((depth, agreeing as f64 / pixels.len() as f64))
 }
 
-/// Starts of a cluster's translation, px.
 fn starts(last: &LastView<'_>, next: &CellLuminance, k: usize, guess: Option<[f64; 2]>, reach: i32) -> Vec<[f64; 2]> {
     let [cx, cy, _] = last.clusters.lattice().cell();
     let matched = last.luminance.find(&last.clusters.template(k), next, reach);

@@ -164,7 +164,6 @@ impl StereoTrackerOptions {
 }
 
 impl StereoTrackerOptions {
-    /// Options of the matching.
     pub(super) fn matching_options(&self, row_offset: Option<f64>) -> EdgeDisparityOptions {
         let ([least, greatest], [first_row, last_row]) = (self.disparity_range, self.row_range);
         EdgeDisparityOptions {
@@ -177,7 +176,6 @@ impl StereoTrackerOptions {
         }
     }
 
-    /// Options of the mixture, from carried components or from seeds.
     pub(super) fn mixture_options(&self, carried: bool, step: usize) -> MixtureOptions {
         MixtureOptions {
             components: self.components,

@@ -25,9 +25,8 @@ fn occupied(clusters: &Clusters, cluster: usize, other: &Clusters, by: [i32; 3])
     counts
 }
 
-/// Looks for the shift in depth, up to `reach` layers, at which one cluster of `other` occupies most voxels
-/// (31), the smaller shift of equals; the overlaps are those with all clusters there (32). Both counts are of
-/// voxels, so that they stay between 0 and 1.
+/// Shift in depth, up to `reach` layers, at which one cluster of `other` occupies most voxels (31), the
+/// smaller of equals, and the overlaps there (32), as shares of voxels, 0 to 1.
 pub(super) fn depth_motion(
     clusters: &Clusters,
     cluster: usize,

@@ -47,7 +47,6 @@ pub(super) fn own_middle(clusters: &Clusters, k: usize, view: View<'_>) -> [f64;
     middle(if 2 * own.len() > all.len() { &own } else { &all })
 }
 
-/// The places among those of a cluster's pixels that show its own surface.
 fn own_places(all: &[[f64; 2]], view: View<'_>) -> Vec<[f64; 2]> {
     let squares = Squares::new(all);
     let crowds = squares.crowds(all);
@@ -83,13 +82,11 @@ fn direction(frame: &Frame<f32>, x: usize, y: usize) -> Option<[f64; 2]> {
     (size > 0.0 && size.is_finite()).then(|| [along_x / size, along_y / size])
 }
 
-/// Places by the square of the picture that they are in.
 struct Squares<'a> {
     first: [i64; 2],
     size: [i64; 2],
     places: Vec<Vec<&'a [f64; 2]>>,
-    /// Steps to the squares of a neighbourhood, nearest rings first: most pixels are among others, and the
-    /// nearest ones say so.
+    /// Offsets to neighbouring squares, nearest rings first: these usually decide.
     rings: Vec<[i64; 2]>,
 }
 
@@ -120,13 +117,11 @@ impl<'a> Squares<'a> {
         inside.then_some((row * self.size[0] + column) as usize)
     }
 
-    /// Squares about one, nearest rings first.
     fn about(&self, column: i64, row: i64) -> impl Iterator<Item = &Vec<&'a [f64; 2]>> {
         let square = move |[dx, dy]: &[i64; 2]| self.index(column + dx, row + dy);
         self.rings.iter().filter_map(square).map(|index| &self.places[index])
     }
 
-    /// How many places are about each one of all.
     fn crowds(&self, all: &[[f64; 2]]) -> Vec<usize> {
         let [left, top] = self.first;
         let crowd = |i: i64| self.about(left + i % self.size[0], top + i / self.size[0]).map(Vec::len).sum();
@@ -134,8 +129,7 @@ impl<'a> Squares<'a> {
         all.iter().filter_map(|place| self.index(square_of(place[0]), square_of(place[1]))).map(|i| crowds[i]).collect()
     }
 
-    /// On which side of the edge at a place with a unit normal all the cluster's others are, 1 or -1 along
-    /// the normal; `None` where they are on both, or too few.
+    /// Side of the edge, 1 or -1 along the normal, of all other pixels; `None` if on both, or too few.
     fn only_side(&self, [x, y]: [f64; 2], normal: [f64; 2]) -> Option<f64> {
         let mut counts = [0, 0];
         for other in self.about(square_of(x), square_of(y)).flatten() {

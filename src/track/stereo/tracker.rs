@@ -159,7 +159,6 @@ impl StereoTracker {
         }
     }
 
-    /// When the next step is.
     fn next_moment(&self) -> Clock {
         let Clock { now, step_time, .. } = self.clock;
         let gap = self.waited.map_or(1.0, |dt| dt / step_time);

@@ -41,15 +41,11 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
     out
 }
 
-/// Seeds components with fewer than [`MIN_COMPONENT_PIXELS`] pixels, or spread so thinly that they explain
-/// none, at the largest blobs of unexplained pixels. Returns which were seeded and the unexplained voxels
-/// outside of such blobs.
+/// Seeds components with fewer than [`MIN_COMPONENT_PIXELS`] pixels, or spread too thinly, at the largest
+/// blobs of unexplained pixels. Returns which were seeded and the other unexplained voxels.
 ///
-/// One seed a blob: several would compete for it over the next steps and exchange tracks. Explained pixels do
-/// not count, because a seed beside a flat component could take that over.
-///
-/// # Errors
-/// Those of the mixture.
+/// One seed a blob: several would compete for it and exchange tracks. Explained pixels do not count, because
+/// a seed beside a flat component could take that over.
 pub(super) fn reseed(posterior: &mut Posterior, voxels: &Voxels, points: &Points) -> Result<Seeded> {
     let components = posterior.components();
     let (densities, shares) = posterior.log_densities(points)?;
@@ -74,8 +70,7 @@ pub(super) fn reseed(posterior: &mut Posterior, voxels: &Voxels, points: &Points
     Ok(Seeded { seeds, outliers })
 }
 
-/// Whether a component has fewer than [`MIN_COMPONENT_PIXELS`] of all pixels, or is spread so thinly that it
-/// explains none.
+/// Whether a component has fewer than [`MIN_COMPONENT_PIXELS`] of all pixels, or explains none.
 fn is_left_over(posterior: &Posterior, k: usize, (pixels, all): (f64, f64)) -> bool {
     pixels < MIN_COMPONENT_PIXELS || log_density(pixels / all, &covariance(posterior, k)) < explaining(all)
 }
@@ -87,12 +82,10 @@ fn explaining(all: f64) -> f64 {
     log_density(least / all.max(least), &Matrix3::from_diagonal(&SEED_STD.map(|s| s * s).into()))
 }
 
-/// Covariance of a component, cells^2.
 fn covariance(posterior: &Posterior, k: usize) -> Matrix3<f64> {
     Matrix3::from_row_slice(&posterior.scale_inverses[k * D * D..][..D * D]) / posterior.degrees_of_freedom[k]
 }
 
-/// Result of seeding.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Seeded {
     /// Which components were seeded.

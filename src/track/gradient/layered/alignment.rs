@@ -17,7 +17,6 @@ const MAX_ROUND_INFORMATION: f64 = 0.1;
 /// What the covariance is multiplied by: neighbouring residuals are not independent.
 const CORRELATION_FACTOR: f64 = 4.0;
 
-/// Where the target was found.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Alignment {
     pub pose: Pose,
@@ -29,7 +28,6 @@ pub(super) struct Alignment {
     pub gain: f64,
 }
 
-/// The residual's standard deviation, robustly.
 fn deviation(votes: &[Vote], noise: f64, range: f64) -> f64 {
     let mut sizes: Vec<f64> = votes.iter().map(|vote| vote.residual.abs()).collect();
     (robust_std(&mut sizes).unwrap_or(0.0)).max(noise).max(MIN_STD_PER_RANGE * range)

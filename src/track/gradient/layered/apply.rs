@@ -35,7 +35,6 @@ const SETTLING: (f64, f64) = (3.0, 0.8);
 /// What it moves in a frame at rest, px.
 const SETTLED: f64 = 0.02;
 
-/// A measurement.
 pub(super) fn apply_measurement(state: &mut State, found: &Finding, frame: &Frame<f64>) {
     let Finding { aligned, score, occluded, .. } = *found;
     let interrupted = state.history.missed > 0 || state.history.occluded || occluded;
@@ -132,7 +131,6 @@ pub(super) fn learn_from(state: &mut State, frame: &Frame<f64>, gain: f64, visib
     learn::learn_background(&mut state.background, frame, &hidden, state.scene.noise);
 }
 
-/// No measurement.
 pub(super) fn coast(state: &mut State) {
     state.history.missed += 1;
     state.history.occluded_frames = 0;

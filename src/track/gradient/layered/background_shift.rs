@@ -5,14 +5,12 @@ use crate::track::gradient::shift::shifted_into;
 use crate::types::Frame;
 use std::ops::Range;
 
-/// Pixels along an axis of a picture that was shifted, where they come from pixels.
 struct Sources {
     to: Range<usize>,
     /// How much farther on the nearest pixel is that each comes from.
     by: isize,
 }
 
-/// Those of so many pixels that come from places so far on.
 fn sources(length: usize, back: f64) -> Sources {
     let inside = |at: &usize| (0.0..=length as f64 - 1.0).contains(&(*at as f64 + back));
     let first = (0..length).find(inside).unwrap_or(length);
@@ -21,21 +19,18 @@ fn sources(length: usize, back: f64) -> Sources {
 }
 
 impl Sources {
-    /// Where the pixels come from.
     fn from(&self) -> Range<usize> {
         let on = |at: usize| (at as isize + self.by) as usize;
         on(self.to.start)..on(self.to.end)
     }
 
-    /// Where one of them comes from.
     fn of(&self, at: usize) -> Option<usize> {
         self.to.contains(&at).then(|| (at as isize + self.by) as usize)
     }
 }
 
 impl Background {
-    /// The scene moved by so many px in the picture. What comes into view is taken as it is seen, but does
-    /// not count as known.
+    /// Moves the scene by some px; pixels that come into view are stored, but do not count as known.
     pub(super) fn moved(&mut self, by: [f64; 2], frame: &Frame<f64>) {
         let back = by.map(|b| -b);
         let (width, height) = self.known.size();

@@ -38,9 +38,8 @@ impl FramePyramid {
     }
 }
 
-/// Translation of the still scene from one frame to the next, px; zero unless it explains the frames better.
-/// `before` is that of the frame before. Where the scene moves, but not as one, that of what is around the
-/// target.
+/// Translation of the still scene between frames, px; zero unless it explains the frames better. `before`:
+/// the previous one. Where the scene does not move as one: that around the target.
 pub(super) fn camera_motion(
     previous: &FramePyramid,
     now: &FramePyramid,
@@ -55,7 +54,6 @@ pub(super) fn camera_motion(
     nearby((&previous.frame, &now.frame), target, (scene, before), noise)
 }
 
-/// That of most of the picture.
 fn scene_motion(
     previous: &FramePyramid,
     now: &FramePyramid,
@@ -84,9 +82,8 @@ fn scene_motion(
     motion
 }
 
-/// Scatter of what the still scene changed by since the frame before, grey levels: the deviation of
-/// differences from their median, robustly, where the scene moved by `motion` in the picture. Light that
-/// falls on all of it alike is no scatter.
+/// Scatter of the still scene's change since the previous frame, grey levels: robust standard deviation about
+/// the median, which removes a uniform change of light.
 pub(super) fn scatter(previous: &Frame<f64>, now: &Frame<f64>, target: TargetBox, motion: [f64; 2]) -> f64 {
     let hidden = grown(target, (0.0, SCENE_MARGIN));
     let still = motion == [0.0; 2];
@@ -98,7 +95,6 @@ pub(super) fn scatter(previous: &Frame<f64>, now: &Frame<f64>, target: TargetBox
     scatter_of(spread(previous.size(), hidden, SCATTER_SAMPLES).filter_map(change).collect())
 }
 
-/// Means over squares of `factor` px, then a Gaussian.
 fn reduced(frame: &Frame<f64>, factor: usize) -> Frame<f64> {
     let (width, height) = (frame.width() / factor, frame.height() / factor);
     let mut small = Frame::filled(width, height, 0.0);

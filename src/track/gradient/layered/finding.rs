@@ -21,22 +21,17 @@ pub(super) const MIN_CONTRAST_PER_NOISE: f64 = 1.0;
 pub(super) const DOUBTED_INNOVATION: f64 = 12.0;
 /// Frames in which the support is still adapting to what the box holds.
 pub(super) const SETTLING_FRAMES: usize = 6;
-/// What is said of a target that an object hides in part.
 pub(super) const COVERED: &str = "something covers the target";
 /// Part of the target's area that may look like it beside it.
 pub(super) const MAX_ADJACENT_SHARE: f64 = 0.06;
-/// What is said then.
 pub(super) const TOUCHED: &str = "something like the target touches it";
-/// What is said of a target that was looked for.
 pub(super) const SEARCHED: &str = "found by looking all around";
 /// Loss of visibility that is one.
 pub(super) const MIN_VISIBILITY_LOSS: f64 = 0.08;
 /// Innovation squared up to which a measurement is not questioned when the camera moves.
 pub(super) const MAX_UNDOUBTED_INNOVATION: f64 = 4.0;
-/// Reason of a target found at another size.
 pub(super) const RESIZED: &str = "what seemed to cover the target was a change of its size";
 
-/// What a frame says of the target.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Finding {
     pub aligned: Alignment,
@@ -47,7 +42,6 @@ pub(super) struct Finding {
     pub reason: &'static str,
 }
 
-/// Aligns and judges.
 pub(super) fn try_at(
     state: &State,
     frame: &Frame<f64>,

@@ -1,10 +1,8 @@
-//! What the first box held in addition to the target: an object at rest in front of it. In the first frames
-//! that move, what moves is separated from what does not.
+//! Initial segmentation: separates the target from an object at rest in front of it in the first box.
 //!
-//! A box that holds half a target and half of what hides it makes a template of both, and the still edge
-//! between them holds the target back. The first frame is therefore kept for a while, and that displacement
-//! since then is looked for that explains what changed: what lies in the displaced box shows the first box
-//! moved along, or the scene as it was.
+//! A box that holds both makes a template of both, and the still edge between them holds the target back. The
+//! first frame is therefore kept, and the displacement since then is found that explains the changes: the
+//! displaced box shows the first box moved along, or the scene as it was.
 
 use super::layers::{Target, holds};
 use super::patch::{Bounds, Patch, bounds_about};
@@ -31,7 +29,6 @@ pub(super) const WHOLE_PIXEL_TOLERANCE: f64 = 2.0;
 /// Pixels that judge a displacement, about.
 const VOTES: f64 = 1024.0;
 
-/// The first frame about the box.
 #[derive(Debug)]
 pub(super) struct InitialSegmentation {
     pub bounds: TargetBox,
@@ -136,7 +133,6 @@ impl Changes<'_> {
         beyond(self.segmentation.between.get(from[0], from[1]), self.now.get(to[0], to[1]))
     }
 
-    /// What noise does not make of a change.
     fn excess(&self, change: f64) -> f64 {
         (change - self.bar).clamp(0.0, MAX_CHANGE)
     }
@@ -175,8 +171,7 @@ impl Changes<'_> {
         pixels.filter(|(_, inside)| !**inside).map(|((now, first), _)| self.excess((now - first).abs())).sum()
     }
 
-    /// Change at every pixel of the patch that noise does not make, grey levels, and that of it which is
-    /// beside the box.
+    /// Change at every pixel of the patch beyond the noise, grey levels, and its part beside the box.
     fn rests(&self) -> Frame<[f64; 2]> {
         let (width, height) = self.now.size();
         Frame::from_fn(width, height, |x, y| {
@@ -185,8 +180,7 @@ impl Changes<'_> {
         })
     }
 
-    /// What is left of it, and of what changed in the box, where the box moved on; `voting` pixels of the box
-    /// with the least and the greatest brightness around them.
+    /// Sum of changes left if the box moved by `d`; `voting`: pixels of the box with their range.
     fn within(&self, d: [isize; 2], voting: &[([usize; 2], [f64; 2])], rests: &Frame<[f64; 2]>) -> f64 {
         let left = |&(from, between): &([usize; 2], [f64; 2])| {
             let Some([x, y]) = self.on(from, d) else { return 0.0 };
@@ -205,7 +199,6 @@ impl Changes<'_> {
     }
 }
 
-/// How far a value is beyond two limits.
 fn beyond([low, high]: [f64; 2], value: f64) -> f64 {
     (low - value).max(value - high).max(0.0)
 }

@@ -1,9 +1,7 @@
-//! A target that vanishes soon after it was seen less or became smaller: an object had begun to cover it, and
-//! what was measured meanwhile was the rest of it.
+//! Keeps the last state before a target began to vanish, and goes on from there.
 //!
-//! The edge of what covers a target stands for the target's own; a similarity that follows it shrinks and
-//! stays behind, and a filter that believed it leads the search away from where the target comes out again.
-//! The last state before that is therefore kept, and what vanishes goes on from there.
+//! The edge of an occluder is mistaken for the target's own: a similarity that follows it shrinks and lags,
+//! and a filter that believes it misleads the search where the target reappears.
 
 use super::finding::{Finding, MIN_VISIBILITY_LOSS};
 use super::state::{LastGood, State};
@@ -14,8 +12,7 @@ const MAX_FRAMES: usize = 6;
 /// Part of the acceleration that is kept, as where a known surface covers the target.
 pub(super) const DAMPED: f64 = 0.3;
 
-/// After a measurement: keeps the state if the target was seen whole; `smaller`: it shrank by what cover
-/// makes of it.
+/// After a measurement: keeps the state if the target was seen whole; `smaller`: it shrank as under cover.
 pub(super) fn keep_last_good(state: &mut State, found: &Finding, smaller: bool) {
     let whole =
         !found.occluded && !smaller && found.score.visibility >= state.history.mean_visibility - MIN_VISIBILITY_LOSS;
@@ -33,8 +30,7 @@ pub(super) fn keep_last_good(state: &mut State, found: &Finding, smaller: bool) 
     }
 }
 
-/// At the first frame in which the target is not seen any more: goes on from before it began to vanish,
-/// where that was not noticed. What leaves the picture is not covered: what was measured of it is right.
+/// In the first frame without the target: restores the last good state, unless it left the picture.
 pub(super) fn restore_last_good(state: &mut State) {
     let TargetBox { x, y, width, height } = state.reached(&state.motion.pose);
     let (columns, rows) = state.scene.previous.frame.size();

@@ -28,7 +28,6 @@ const EDGE: f64 = 0.1;
 /// Weight of the first support, grey^2.
 pub(super) const PRIOR: f64 = 144.0;
 
-/// The target.
 #[derive(Debug, Clone)]
 pub(super) struct Target {
     /// Support, 0 to 1.
@@ -141,7 +140,6 @@ impl Target {
     }
 }
 
-/// Whether a place is in the picture.
 #[inline(always)]
 pub(super) fn is_inside([x, y]: [f64; 2], frame: &Frame<f64>) -> bool {
     x >= 0.0 && y >= 0.0 && x <= frame.width() as f64 - 1.0 && y <= frame.height() as f64 - 1.0
@@ -208,13 +206,11 @@ pub(super) fn grown(bounds: TargetBox, (share, more): (f64, f64)) -> TargetBox {
     )
 }
 
-/// Whether a place is in a box.
 pub(super) fn contains(bounds: &TargetBox, [x, y]: [f64; 2]) -> bool {
     let within = |at: f64, from: f64, length: f64| (from..=from + length).contains(&at);
     within(x, bounds.x, bounds.width) && within(y, bounds.y, bounds.height)
 }
 
-/// Whether a pixel's centre is in a box.
 pub(super) fn holds(bounds: &TargetBox, x: usize, y: usize) -> bool {
     contains(bounds, [x as f64, y as f64])
 }

@@ -26,7 +26,6 @@ const NOISE_RATE: f64 = 0.1;
 /// Pixels that the noise is measured on, at most.
 const SAMPLES: usize = 4096;
 
-/// Support and brightness of the target.
 pub(super) fn learn_target(target: &mut Target, view: &View, gain: f64, noise: f64) {
     learn_fresh(target, view, gain, noise);
     for at in 0..view.seen.len() {
@@ -46,8 +45,7 @@ pub(super) fn learn_target(target: &mut Target, view: &View, gain: f64, noise: f
     }
 }
 
-/// Brightness of points that were hidden at first: the mean of what is seen of them, and not of what hides
-/// them, until they are known as well as others.
+/// Brightness of points hidden at first: the mean of what is seen of them, until they are known as well.
 pub(super) fn learn_fresh(target: &mut Target, view: &View, gain: f64, noise: f64) {
     let Some(mut fresh) = target.fresh.take() else { return };
     let least = 4.0 * noise + 6.0;
@@ -87,7 +85,6 @@ fn learn_support(target: &mut Target, at: usize, (seen, behind, bright): (f64, f
     target.a.data_mut()[at] = (n / d).clamp(0.0, 1.0);
 }
 
-/// Outside the solid part the template goes on as it is near it.
 fn continue_template(target: &mut Target) {
     let (width, height) = target.t.size();
     let known =
@@ -101,7 +98,6 @@ fn continue_template(target: &mut Target) {
     }
 }
 
-/// The background outside the box of the target, which turns with it.
 pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, hidden: &OrientedBox, noise: f64) {
     let sudden = 6.0 * noise + 8.0;
     let (width, height) = frame.size();
@@ -118,7 +114,6 @@ pub(super) fn learn_background(background: &mut Background, frame: &Frame<f64>, 
     }
 }
 
-/// The step of the background at a row of pixels.
 struct Behind<'a> {
     picture: &'a mut [f64],
     seen: &'a [f64],
@@ -146,8 +141,7 @@ impl Kernel<f64> for Behind<'_> {
     }
 }
 
-/// The noise of the frames, from how the still scene differs from one to the next; grey levels. `noise`: what
-/// it was before, if that is known.
+/// Noise of the frames from the change of the still scene, grey levels; `noise`: the previous estimate.
 pub(super) fn learn_noise(noise: Option<f64>, previous: &Frame<f64>, frame: &Frame<f64>) -> f64 {
     let now = noise_of(previous, frame, SAMPLES);
     noise.map_or(now, |noise| noise + NOISE_RATE * (now - noise)).max(MIN_NOISE)

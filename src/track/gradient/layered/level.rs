@@ -1,5 +1,4 @@
-//! One level of the alignment: picture, background and target smoothed alike, and what the nodes of the
-//! target say there.
+//! One level of the alignment: picture, background and target smoothed alike, and the votes of the nodes.
 
 use super::layers::is_inside;
 use super::patch::{Patch, Places, bounds_about, dilated, smooth};
@@ -19,7 +18,6 @@ const BRIGHT: f64 = 0.7;
 /// Support from which on a point must be the target, unless it is occluded.
 const SOLID: f64 = 0.3;
 
-/// A node that may vote.
 #[derive(Debug, Clone, Copy)]
 struct Node {
     /// Column and row of the target's grid.
@@ -41,7 +39,6 @@ struct Readings {
     behind: Vec<f64>,
 }
 
-/// One level: everything smoothed alike.
 pub(super) struct Level<'a> {
     task: Task<'a>,
     sigma: f64,
@@ -70,7 +67,6 @@ impl<'a> Level<'a> {
         }
     }
 
-    /// Reads picture and background at the nodes.
     fn read(&mut self, pose: &Pose) {
         let Readings { places, seen, behind } = &mut self.readings;
         places.refill(pose, self.nodes.iter().map(|node| node.xi));

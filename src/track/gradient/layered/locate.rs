@@ -25,7 +25,6 @@ const DISPLACEMENT_STD: f64 = 1.0;
 pub(super) const MIN_VISIBILITY_WITHOUT_SEARCH: f64 = 0.6;
 /// The same from which on, on one side, a look-alike touches.
 pub(super) const TOUCH: (f64, f64) = (0.08, 0.6);
-/// What is said where it did a moment ago, and its pull may still be felt.
 pub(super) const TOUCHED_BEFORE: &str = "something like the target touched it a moment ago";
 /// Reach of the search, px: at first, and at most.
 pub(super) const REACH: (usize, usize) = (12, 36);
@@ -84,8 +83,7 @@ pub(super) fn locate(state: &State, frame: &Frame<f64>) -> Option<Finding> {
     })
 }
 
-/// A target that comes out of cover smaller than it went in: the part that is seen would fit a smaller one,
-/// and the size is held.
+/// A target that reappears: the visible part would fit a smaller one, so the size is held.
 fn locate_returning(state: &State, frame: &Frame<f64>, plain: Option<&Finding>, levels: &[f64]) -> Option<Finding> {
     let returns = state.history.missed > 0 || state.history.reappearing > 0;
     if !returns || !state.has_shrunk(&plain?.aligned.pose) || !crate::ablation::keeps("gradient.returning_size") {
@@ -113,10 +111,8 @@ fn locate_displaced(state: &State, frame: &Frame<f64>, plain: Option<&Finding>) 
     (is_there(&found) && found.score.visibility >= least).then_some(found)
 }
 
-/// Whether an object that looks like the target touches it: much of it beside the target, on one side. A
-/// moment after that was so, what pulls the target out of its way or makes it grow is still the
-/// look-alike. That ends by itself: size and way of the target are not followed meanwhile, and would
-/// differ the more the longer it lasts.
+/// Whether a look-alike touches the target on one side, or did a moment ago and may still pull it. This ends
+/// by itself: size and position are held meanwhile, and would differ the more the longer it lasts.
 pub(super) fn look_alike_reason(state: &State, found: &Finding) -> Option<&'static str> {
     if found.score.leak > TOUCH.0 && found.score.one_sided > TOUCH.1 {
         return Some(TOUCHED);
@@ -128,7 +124,6 @@ pub(super) fn look_alike_reason(state: &State, found: &Finding) -> Option<&'stat
         .then_some(TOUCHED_BEFORE)
 }
 
-/// A similar object touches it.
 pub(super) fn locate_beside_look_alike(
     state: &State,
     frame: &Frame<f64>,
@@ -145,7 +140,6 @@ pub(super) fn locate_beside_look_alike(
     Some(Finding { occluded: true, reason, ..found })
 }
 
-/// All around, in whole pixels, and then as usual.
 pub(super) fn search_around(state: &State, frame: &Frame<f64>) -> Option<Finding> {
     if !crate::ablation::keeps("gradient.search") {
         return None;
@@ -158,8 +152,7 @@ pub(super) fn search_around(state: &State, frame: &Frame<f64>) -> Option<Finding
     (found.score.visibility >= MIN_VISIBILITY_TO_LEARN).then_some(Finding { reason: SEARCHED, ..found })
 }
 
-/// Usually the target stands in the scene and goes with it when the camera moves. It may also be that the
-/// camera follows the target: where one of the two is doubtful, the other is tried.
+/// Usually the target moves with the scene under a moving camera; in doubt, a camera that follows is tried.
 pub(super) fn locate_with_camera(state: &mut State, frame: &Frame<f64>, motion: [f64; 2]) -> Option<Finding> {
     let against = motion.map(|m| -m);
     if motion != [0.0; 2] && state.motion.rides_camera {

@@ -61,13 +61,10 @@ use state::MIN_NOISE;
 
 /// What is said of a frame with NaN, infinity or numbers that are no brightness.
 const UNUSABLE: &str = "the frame cannot be used";
-/// What is said of a frame in which the scene is gone before anything was measured.
 const BLANK: &str = "the frame shows nothing of the scene";
-/// What is said of a frame that has little to do with the one before.
 const WILD: &str = "the frame is nothing like those before";
 
-/// A frame shifted to where the scene is in the next one, if the camera moved between them; NaN where that
-/// shows nothing of it.
+/// A frame shifted to where the scene is in the next one, if the camera moved; NaN where nothing is known.
 pub(super) fn stilled(frame: &Frame<f64>, next: &Frame<f64>) -> Option<Frame<f64>> {
     let nowhere = TargetBox::about([-1e6; 2], 0.0, 0.0);
     let seen = [frame, next].map(|frame| FramePyramid::new(frame.clone()));
@@ -116,7 +113,6 @@ pub(super) fn update(tracker: &mut State, frame: Option<&Frame<f64>>, state: &mu
     tracker.scene.buffer = std::mem::replace(&mut tracker.scene.previous, seen).frame.into_data();
 }
 
-/// A frame that says nothing.
 fn pass_over(tracker: &mut State, state: &mut TrackState, reason: &'static str) {
     tracker.initial.iter_mut().for_each(InitialSegmentation::skip);
     tracker.motion.filter.predict();

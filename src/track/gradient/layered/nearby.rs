@@ -18,8 +18,7 @@ const EXPLAINED: (f64, f64) = (3.0, 1.0);
 /// Farthest another motion may be from it along both axes, px.
 const REACH: i32 = 3;
 
-/// `scene`, which is the motion of most of the picture, px, unless another one explains clearly better what
-/// is around the target. `before` is that of the frame before.
+/// Motion around the target, px: `scene` unless another explains it clearly better; `before`: previous one.
 pub(super) fn nearby(
     (previous, now): (&Frame<f64>, &Frame<f64>),
     target: TargetBox,

@@ -45,7 +45,6 @@ pub(super) struct HiddenPart {
     pub hidden: Frame<bool>,
 }
 
-/// Looks in the next frame for what hides part of the first box.
 pub(super) fn find_occluder(initial: &mut InitialSegmentation, frame: &Frame<f64>, noise: f64) -> Option<HiddenPart> {
     initial.advance();
     let changes = initial.changes(frame, noise);
@@ -56,12 +55,10 @@ pub(super) fn find_occluder(initial: &mut InitialSegmentation, frame: &Frame<f64
     hidden.map(|hidden| HiddenPart { moved: moved.map(|m| m as f64), frames: initial.frames(), hidden })
 }
 
-/// Pixels of the box at which an object at rest hides the target; `None` without evidence for that.
+/// Pixels of the box at which an object at rest hides the target; `None` without evidence.
 ///
-/// Wherever the target slides along a still edge, what was there in the first frame is neither followed by it
-/// nor changed. What is on the target's side of that edge looks like what is known to move, on the other side
-/// it does not. A margin that is behind the target differs: there the target leaves what does not look like
-/// it.
+/// Along a still edge the content of the first frame neither follows the target nor changes. The target's
+/// side looks like what moves, the other side does not; from a margin behind it the target moves away.
 fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<bool>> {
     let evidence = Evidence::of(changes, moved);
     let look = Appearance::of(changes, &evidence.moving)?;
@@ -86,8 +83,7 @@ fn hidden(changes: &Changes<'_>, moved: [isize; 2]) -> Option<Frame<bool>> {
     (cut && is_so(changes, &hidden, moved)).then_some(hidden)
 }
 
-/// Whether the two parts do as they should: what hides the target is as it was, and the target is as it was,
-/// moved along, but where it is hidden now.
+/// Whether both parts are unchanged: the occluder in place, the target moved along except where hidden.
 fn is_so(changes: &Changes<'_>, hidden: &Frame<bool>, moved: [isize; 2]) -> bool {
     let (mut strays, mut counts) = ([0.0; 2], [0.0; 2]);
     let clear = CLEAR * changes.bar;
@@ -116,12 +112,10 @@ fn parts(changes: &Changes<'_>, hidden: &Frame<bool>) -> (f64, f64) {
     (sums[1][0] / (sums[0][0] + sums[1][0]), (seen[0] - not[0]).hypot(seen[1] - not[1]))
 }
 
-/// What a displacement shows of single pixels.
 struct Evidence {
     /// Pixels of the first box that were followed by the displacement, and not by rest.
     moving: Vec<[usize; 2]>,
-    /// Pixels of it with those that they would be at now, where the displacement does not hold and nothing
-    /// changed at the first or at the second.
+    /// Pairs (pixel of the box, moved pixel) where the displacement fails and neither pixel changed.
     edge: Vec<([usize; 2], [usize; 2])>,
 }
 
@@ -143,8 +137,7 @@ impl Evidence {
     }
 }
 
-/// Change from what was at a pixel or beside it to what is at another: displacements are right to a pixel,
-/// and targets turn and grow.
+/// Change between the surroundings of two pixels: displacements are whole pixels, targets turn and grow.
 fn unlike_all_around(changes: &Changes<'_>, [x, y]: [usize; 2], [i, j]: [usize; 2]) -> f64 {
     let first = &changes.segmentation.first.frame;
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -157,7 +150,6 @@ fn unlike_all_around(changes: &Changes<'_>, [x, y]: [usize; 2], [i, j]: [usize; 
     (low - now).max(now - high)
 }
 
-/// How the target looks, from what is known to move.
 struct Appearance {
     mean: Frame<f64>,
     scatter: f64,
@@ -182,7 +174,6 @@ impl Appearance {
         })
     }
 
-    /// Whether a brightness is the target's at a pixel.
     fn holds(&self, value: f64, [x, y]: [usize; 2]) -> bool {
         let off = (value - self.mean.get(x, y)).abs();
         // Far from all that moves nothing is known, and nothing holds.
@@ -206,8 +197,7 @@ fn behind(changes: &Changes<'_>) -> f64 {
     if count > 0.0 { sum / count } else { f64::INFINITY }
 }
 
-/// Every pixel of the box belongs to the nearer of what moves and of what is still, by ways that avoid steps
-/// of brightness.
+/// Assigns every pixel of the box to what moves or is still, by paths that avoid brightness steps.
 fn spread(changes: &Changes<'_>, moving: &[[usize; 2]], still: &[[usize; 2]]) -> Frame<bool> {
     let first = &changes.segmentation.first.frame;
     let (width, height) = first.size();

@@ -65,8 +65,7 @@ pub(super) fn locate_occluded(
     taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
 }
 
-/// A known surface begins to cover a large target, and its edge stands for the target's own: what is on
-/// the side towards which the target is off has no vote.
+/// A large target whose edge begins to be covered: the side towards which it is off has no vote.
 pub(super) fn locate_entering_occlusion(state: &State, frame: &Frame<f64>, plain: &Finding) -> Option<Finding> {
     let (at, expected) = (state.position(&plain.aligned.pose), state.motion.filter.position());
     let side = VoteMask::Towards([expected[0] - at[0], expected[1] - at[1]]);
@@ -76,9 +75,8 @@ pub(super) fn locate_entering_occlusion(state: &State, frame: &Frame<f64>, plain
     taken.then_some(Finding { occluded: true, reason: COVERED, ..found })
 }
 
-/// Whether what is not seen of it may be covered. While the support is still adapting to the box that is
-/// not known, but of a large target that was seen whole: of a small one a wrong box leaves as much unseen
-/// as cover.
+/// Whether what is not seen may be covered: not while the support still adapts, except for a large target
+/// seen whole. A wrong box leaves as much of a small target unseen as cover.
 pub(super) fn is_settled(state: &State) -> bool {
     state.history.age >= SETTLING_FRAMES && !state.is_adapting()
         || crate::ablation::keeps("gradient.known_if_large") && state.history.max_visibility > WHOLE && is_large(state)
@@ -89,17 +87,14 @@ pub(super) fn is_large(state: &State) -> bool {
     STRIP / state.side() < MIN_VISIBILITY_LOSS
 }
 
-/// Whether a large target is not where it is expected. The filter takes turns for granted, and is no
-/// judge of fractions of a pixel.
+/// Whether a large target is off its expected place; the filter cannot judge fractions of a pixel.
 pub(super) fn may_be_held_back(state: &State, plain: &Finding) -> bool {
     is_large(state) && distance_from_expected(state, plain) > HELD_BACK
 }
 
-/// Whether a large target is rather `elsewhere`, nearer to where it is expected, than where it would be
-/// if all of it were seen, `plain`. The edge of what begins to cover a plain target stands for its own,
-/// and holds it back or makes it shrink at the price of another: the area that is not explained stays the
-/// same. A target that has really turned leaves two strips that are not, one on either side of the
-/// expected place, as long as the target is wide and as wide as it is off.
+/// Whether a large target is rather `elsewhere`, nearer to the prediction, than at `plain`. The edge of an
+/// occluder holds an even target back or shrinks it; the unexplained area stays the same. A target that has
+/// really turned leaves two unexplained strips, as long as the target and as wide as it is off.
 pub(super) fn is_held_back(state: &State, elsewhere: &Finding, plain: &Finding) -> bool {
     let [at, held] = [elsewhere, plain].map(|finding| state.position(&finding.aligned.pose));
     let apart = (at[0] - held[0]).hypot(at[1] - held[1]);
@@ -110,13 +105,11 @@ pub(super) fn is_held_back(state: &State, elsewhere: &Finding, plain: &Finding) 
         && elsewhere.score.mismatch < plain.score.mismatch + strip
 }
 
-/// Distance from where the target is expected, px.
 pub(super) fn distance_from_expected(state: &State, found: &Finding) -> f64 {
     let (at, expected) = (state.position(&found.aligned.pose), state.motion.filter.position());
     (at[0] - expected[0]).hypot(at[1] - expected[1])
 }
 
-/// Standard deviation of the expected position, px.
 pub(super) fn position_std(state: &State) -> f64 {
     (0.5 * (state.motion.filter.p[0][(0, 0)] + state.motion.filter.p[1][(0, 0)])).sqrt().clamp(0.2, 3.0)
 }

@@ -2,7 +2,6 @@
 
 use super::pose::Pose;
 
-/// The image of an upright box about a point of the target.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OrientedBox {
     middle: [f64; 2],

@@ -10,7 +10,6 @@ const TRUNCATE: f64 = 3.0;
 /// Least share of known pixels that a mean rests on.
 const MIN_KNOWN_SHARE: f64 = 1e-3;
 
-/// A rectangle of a picture.
 #[derive(Debug, Clone)]
 pub(super) struct Patch {
     pub frame: Frame<f64>,
@@ -113,12 +112,10 @@ impl Places {
     }
 }
 
-/// Indices no farther than `reach` from one, of `length`.
 pub(super) fn wide(at: usize, reach: usize, length: usize) -> std::ops::Range<usize> {
     at.saturating_sub(reach)..(at + reach + 1).min(length)
 }
 
-/// Everything within `reach` points along both axes.
 pub(super) fn dilated(mask: &Frame<bool>, reach: usize) -> Frame<bool> {
     let (width, height) = mask.size();
     let along = Frame::from_fn(width, height, |i, j| mask.row(j)[wide(i, reach, width)].contains(&true));

@@ -1,8 +1,6 @@
-//! A first box that is too large, too small or beside the target: what moves has another outline.
-//!
-//! In the first frames that move, what moves is looked for without the box ([`detect_moving_target`]). Where
-//! it has clearly other sides than the box, what else the box holds stayed where it was and does not look
-//! like the target, and what the box leaves out moved along, it is the target.
+//! A first box that is too large, too small or off: in the first frames that move, what moves is found
+//! without the box ([`detect_moving_target`]). It is the target if it has clearly other sides, the rest of
+//! the box stayed and looks different, and what the box leaves out moved along.
 
 use super::initial::{Changes, InitialSegmentation};
 use super::layers::{grown, holds};
@@ -66,18 +64,15 @@ impl InitialSegmentation {
     }
 }
 
-/// Displacement along the axis it is greater on, px.
 fn greater(displacement: [f64; 2]) -> f64 {
     displacement[0].abs().max(displacement[1].abs())
 }
 
-/// Least and greatest coordinate along both axes.
 fn ends(bounds: &TargetBox) -> [[f64; 2]; 2] {
     [[bounds.x, bounds.x + bounds.width], [bounds.y, bounds.y + bounds.height]]
 }
 
-/// Whether what moves has clearly other sides than the box, or another middle, and may still be what the box
-/// is about.
+/// Whether what moves clearly differs from the box in sides or middle, but may still be its target.
 fn is_another(bounds: &TargetBox, first: &TargetBox) -> bool {
     let (held, found) = (ends(bounds), ends(first));
     let (mut apart, mut longer, mut within, mut centred) = (0.0, false, true, true);
@@ -96,8 +91,7 @@ fn is_another(bounds: &TargetBox, first: &TargetBox) -> bool {
 }
 
 impl Changes<'_> {
-    /// Whether what lies in only one of the box and the outline of what moves did as it should: in the box
-    /// alone it stayed and does not look like the target, in the outline alone it moved along.
+    /// Whether what is only in the box stayed and looks different, and what is only in the outline moved.
     fn are_explained(&self, first: &TargetBox, found: &MovingTarget) -> bool {
         let corner = self.segmentation.first.corner;
         let d = found.displacement.map(|d| d as isize);
@@ -119,7 +113,7 @@ impl Changes<'_> {
             }
             if in_box && !holds(&outline, at.0, at.1) && !holds(&now, at.0, at.1) {
                 counts[0] += 1;
-                // What looks like the target is its own if it may have moved with it; of an even background
+                // What looks like the target is its own if it may have moved with it; on an even background
                 // both hold.
                 let along = self.on([x, y], d).is_none_or(|to| self.along([x, y], to) <= self.bar);
                 strays[0] += usize::from(self.at_rest([x, y]) > self.bar || like && along);
@@ -135,7 +129,6 @@ impl Changes<'_> {
             && (0..2).all(|k| strays[k] as f64 <= MAX_OUTLIER_SHARE * counts[k] as f64)
     }
 
-    /// Usual range of the brightness in a part of the first frame, grey levels.
     fn brightness_range(&self, part: &TargetBox) -> [f64; 2] {
         let corner = self.segmentation.first.corner;
         let (width, height) = self.now.size();

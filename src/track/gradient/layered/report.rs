@@ -25,11 +25,9 @@ pub(super) fn report(tracker: &State, state: &mut TrackState, found: Option<&Fin
     state.innovation = found.map_or(f64::NAN, |found| found.nis);
 }
 
-/// What the filter says, and the box there.
 pub(super) fn report_motion(tracker: &State, state: &mut TrackState) {
     let (speed, motion) = (tracker.motion.filter.speed(), state.camera_motion);
-    // The filter's velocity is relative to the scene, or to the picture for a target that the camera
-    // follows.
+    // The filter's velocity is relative to the scene, or to the picture if the camera follows.
     (state.velocity, state.scene_velocity) = if tracker.motion.rides_camera {
         (speed, [0, 1].map(|k| speed[k] - motion[k]))
     } else {

@@ -1,10 +1,8 @@
-//! A target whose outline changes as no turning and no change of size makes it: one that breathes, bends or
-//! turns out of the plane.
+//! A target whose outline changes as no similarity does: it breathes, bends or turns out of the plane.
 //!
-//! A similarity that follows such a target becomes smaller from frame to frame, for it gives up what goes
-//! beyond its outline on two sides for what is missing on the other two, or it stays at one of the edges.
-//! What looks like the target goes on beyond its outline then. Where an affine map from the expected pose
-//! explains nearly all of it, that is the pose; from there on similarities are tried again.
+//! A similarity that follows it shrinks, or stays at one edge, and what looks like the target lies beyond its
+//! outline. Where an affine map from the expected pose explains nearly all of it, that is the pose, from
+//! which similarities are tried again.
 
 use super::finding::{
     DOUBTED_INNOVATION, Finding, MAX_ADJACENT_SHARE, MAX_UNDOUBTED_INNOVATION, MIN_VISIBILITY_LOSS,
@@ -14,13 +12,11 @@ use super::state::State;
 use super::task::{MotionModel, VoteMask};
 use crate::types::Frame;
 
-/// Part of the target's area in which its support is not what the picture shows, from which on its outline is
-/// doubted.
+/// Share of the target's area where support and picture disagree, from which on the outline is doubted.
 const MIN_MISMATCH: f64 = 0.2;
 /// Part of the target's area beside it that looks like it, from which on it is taken for the target's own.
 const MIN_ADJACENT_SHARE: f64 = 0.03;
-/// How far that lies on one side, from which on it may be another object, and the map must be where the
-/// target is expected.
+/// One-sidedness from which on that may be another object: the map must be at the expected place.
 const MIN_ONE_SIDED: f64 = 0.5;
 /// What an affine map may leave of the area that is not explained, share.
 const MAX_MISMATCH_RATIO: f64 = 0.8;

@@ -1,9 +1,8 @@
-//! A target that has long been covered, wherever it went: nothing covers it, it has another size.
+//! A target that has long counted as covered although it only has another size.
 //!
-//! The size of a covered target is held, for what is seen of it says little of the rest. If the size was
-//! wrong when that began, or changes meanwhile, less and less of the target is where it is thought to be, and
-//! that looks like cover again: the two keep each other up. What really covers a target lets a part of its
-//! outline be seen; a target of another size fits all around, and leaves nothing of itself beside it.
+//! The size of a covered target is held, so a wrong size leaves less and less of it where it is expected,
+//! which looks like cover again. An occluder leaves a part of the outline visible; a target of another size
+//! fits all around, and leaves nothing of itself beside it.
 
 use super::alignment::Alignment;
 use super::finding::{Finding, LEVELS, MIN_VISIBILITY_LOSS, MIN_VISIBILITY_TO_LEARN, PRIOR, RESIZED, try_at};
@@ -19,8 +18,7 @@ use crate::types::{Frame, TargetBox};
 
 /// Frames in a row after which cover is doubted.
 const MIN_OCCLUDED_FRAMES: usize = 8;
-/// Part of the target's area that may look like it beside it, or be left out of what the size held would
-/// explain: of a target that is really covered there is more.
+/// Maximum share of the area that looks like the target beside it, or is left out; cover leaves more.
 const MAX_LEFT_OUT_SHARE: f64 = 0.15;
 /// Sizes that are tried, over the one that is held, in this order.
 const SIZES: [f64; 5] = [0.9, 1.1, 0.8, 1.25, 1.0];
@@ -31,8 +29,7 @@ const REACH: usize = 12;
 /// What a part of the target that is not seen counts as, grey levels.
 const UNSEEN: f64 = 6.0;
 
-/// The target at another size than the one held, where it is seen well and explains the picture better
-/// than cover does. One size at a time, in turn, which bounds the time of a covered frame.
+/// The target at another size where that explains more than cover; one size per frame bounds the time.
 pub(super) fn locate_resized(state: &State, frame: &Frame<f64>, covered: &Finding) -> Option<Finding> {
     if state.history.occluded_frames < MIN_OCCLUDED_FRAMES
         || !(state.history.occluded_frames - MIN_OCCLUDED_FRAMES).is_multiple_of(FRAMES_PER_SIZE)
@@ -84,9 +81,8 @@ pub(super) fn unexplained(state: &State, frame: &Frame<f64>, found: &Finding, ar
     sum / f64::max(count, 1.0)
 }
 
-/// Area inside the outline that is held in which the target is seen, and which another size leaves out,
-/// over the area of the target at that size. Between the bars of a fence a small target fits as well as a
-/// part of a large one, but there is more of that between the next bars.
+/// Area of the held outline that shows the target and that another size leaves out, over the target's area at
+/// that size. Between fence bars a small target fits as well, but leaves out more.
 pub(super) fn left_over(state: &State, frame: &Frame<f64>, held: &Finding, resized: &Finding) -> f64 {
     let Alignment { pose, gain, .. } = held.aligned;
     let other = resized.aligned.pose;
@@ -106,14 +102,12 @@ pub(super) fn left_over(state: &State, frame: &Frame<f64>, held: &Finding, resiz
     left_out.count() as f64 / (sides[0] * sides[1] * growth * growth)
 }
 
-/// Whether the target is seen well, better than with cover, and none of it beside the outline.
 fn fits(score: &Score, covered: &Score) -> bool {
     score.visibility >= MIN_VISIBILITY_TO_LEARN
         && score.visibility > covered.visibility + MIN_VISIBILITY_LOSS
         && score.leak < MAX_LEFT_OUT_SHARE
 }
 
-/// First pixel of a box that is in the picture, and the one after the last, along both axes.
 fn pixels(bounds: &TargetBox, (width, height): (usize, usize)) -> [[usize; 2]; 2] {
     let within = |at: f64, length: usize| at.ceil().clamp(0.0, length as f64) as usize;
     [

@@ -37,8 +37,7 @@ pub(super) fn resolve_initial(state: &mut State, frame: &Frame<f64>, motion: [f6
     }
 }
 
-/// The box of what moves, unless the target turned, which changes the outline as well. Its size says
-/// nothing: a box beside the target makes that seem to change.
+/// Box of what moves, unless the target turned; the size says nothing, since a box that is off changes it.
 pub(super) fn box_of_motion(
     state: &State,
     segmentation: &InitialSegmentation,
@@ -67,7 +66,6 @@ pub(super) fn restart_occluded(
     (state.history.occluded, state.history.age, state.history.adapts_until) = (true, SETTLING_FRAMES, 0);
 }
 
-/// The first box was not that of what moves.
 pub(super) fn restart_with_box(state: &mut State, found: &MovingTarget, frame: &Frame<f64>, frames: usize) {
     state.target = Target::new(frame, found.bounds, PRIOR);
     state.background = Background::new(frame, found.bounds);
@@ -92,8 +90,7 @@ pub(super) fn restart_at(state: &mut State, centre: [f64; 2], moved: [f64; 2], f
     (state.last_good, state.history.adapts_until) = (None, MAX_SETTLING_FRAMES);
 }
 
-/// As long as the first box is undecided, what is reported of the way since then may
-/// be wrong by as much as the displacement of all that moved differs from it.
+/// While the first box is undecided, the displacement may be off by its distance from that of all that moved.
 pub(super) fn update_displacement_uncertainty(state: &mut State) {
     let told = state
         .initial
@@ -135,7 +132,6 @@ impl Target {
 }
 
 impl Background {
-    /// What was seen around the first box, and beside the target where that is `now`.
     fn begin_anew(&mut self, segmentation: &InitialSegmentation, found: &HiddenPart, frame: &Frame<f64>, bar: f64) {
         let bounds = segmentation.bounds;
         let there = TargetBox { x: bounds.x + found.moved[0], y: bounds.y + found.moved[1], ..bounds };

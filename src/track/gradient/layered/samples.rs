@@ -35,7 +35,6 @@ pub(super) fn spread(size: (usize, usize), hidden: TargetBox, most: usize) -> im
     })
 }
 
-/// Pixels of a frame that its motion is measured on.
 pub(super) struct Samples {
     places: Vec<(usize, usize)>,
     values: Vec<f64>,
@@ -61,8 +60,7 @@ impl Samples {
         self.places.len()
     }
 
-    /// What the next frame shows at the moved samples, less what they were; NaN where that is not in the
-    /// frame.
+    /// Brightness of the next frame at the moved samples less their own; NaN outside the frame.
     fn residuals(&self, next: &Frame<f64>, motion: [f64; 2]) -> Vec<f64> {
         let whole = motion.map(f64::floor);
         // All samples lie alike between the pixels.
@@ -132,7 +130,6 @@ impl Samples {
     }
 }
 
-/// Standard deviation of the residuals, robustly.
 fn residual_std(residuals: &[f64]) -> f64 {
     let sizes = residuals.iter().step_by(EVERY).map(|r| r.abs()).filter(|r| !r.is_nan());
     robust_std(&mut sizes.collect::<Vec<f64>>()).unwrap_or(0.0)

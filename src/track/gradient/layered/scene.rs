@@ -1,5 +1,4 @@
-//! What a frame says of the still scene before the target is looked for: light, motion of the camera, and
-//! whether it is of that scene at all.
+//! What a frame says of the still scene first: light, camera motion, and whether it shows that scene.
 
 use super::camera::{FramePyramid, camera_motion, scatter};
 use super::layers::grown;
@@ -11,8 +10,7 @@ use crate::track::gradient::noise::scatter_of;
 use crate::track::gradient::options::CameraMotion;
 use crate::types::{Frame, TargetBox};
 
-/// Scatter of what changes in the still scene beyond which a frame is wild: so many times the noise, and grey
-/// levels.
+/// Scatter of the still scene's change beyond which a frame is wild: times the noise, and grey levels.
 const MAX_SCATTER: (f64, f64) = (6.0, 8.0);
 /// Frames in a row that are passed over for that.
 const MAX_WILD_FRAMES: usize = 10;
@@ -20,10 +18,8 @@ const MAX_WILD_FRAMES: usize = 10;
 /// Contrast of the scene over that of the frame before, from which on down it is gone.
 const MAX_CONTRAST_RATIO: f64 = 0.25;
 
-/// Whether nothing of the scene is left in a frame before anything was measured: black, or another even
-/// picture. What noise there is, is learnt from the first pair, and would be all that such a frame
-/// differs by, so that anything would look like the target. Even frames say nothing however many there
-/// are.
+/// Whether nothing of the scene is left in a frame before anything was measured. The noise is learnt from the
+/// first pair: it would hold all that such a frame differs by, and anything would look like the target.
 pub(super) fn is_blank(state: &State, frame: &Frame<f64>) -> bool {
     if state.history.age > 0 {
         return false;
@@ -37,7 +33,6 @@ pub(super) fn is_blank(state: &State, frame: &Frame<f64>) -> bool {
     now < MAX_CONTRAST_RATIO * before && before > MIN_NOISE && state.scene.gap <= MAX_WILD_FRAMES
 }
 
-/// How far the scene moved since the last frame that could be used.
 pub(super) fn measure_camera_motion(state: &State, seen: &FramePyramid, bounds: TargetBox) -> [f64; 2] {
     let expected = state.scene.camera_velocity.map(|m| m * state.scene.gap as f64);
     match state.camera {
@@ -46,9 +41,8 @@ pub(super) fn measure_camera_motion(state: &State, seen: &FramePyramid, bounds: 
     }
 }
 
-/// Whether a frame has little to do with the one before: far too bright, or noise. Nothing can be learnt
-/// from it, and the next one is compared with the last that was not so; unless there are so many of them
-/// that this is how the scene looks now.
+/// Whether a frame has little to do with the one before (too bright, or noise). It is skipped and the next
+/// compared with the last good one, unless so many follow that the scene looks so now.
 pub(super) fn is_wild(state: &mut State, frame: &Frame<f64>, bounds: TargetBox, motion: [f64; 2]) -> bool {
     if state.history.age == 0 {
         return false;

@@ -9,7 +9,6 @@ const CONTRAST: f64 = 60.0;
 /// Contrast of points whose background is not known, grey levels.
 const UNKNOWN: f64 = 30.0;
 
-/// The picture at all nodes of the target's grid.
 #[derive(Debug, Clone)]
 pub(super) struct View {
     /// Brightness; NaN outside the picture.
@@ -20,7 +19,6 @@ pub(super) struct View {
     pub guess: Vec<f64>,
 }
 
-/// What a view amounts to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Score {
     /// Share of the target that is seen, weighed by its contrast.
@@ -35,7 +33,6 @@ pub(super) struct Score {
     pub mismatch: f64,
 }
 
-/// Reads the picture at the nodes.
 pub(super) fn view(frame: &Frame<f64>, target: &Target, background: &Background, pose: &Pose) -> View {
     let places = target.places(pose);
     let (mut seen, mut behind) = (Vec::new(), Vec::new());
@@ -61,9 +58,8 @@ pub(super) fn is_hit(seen: f64, bright: f64, behind: f64, noise: f64) -> bool {
     nearer && off < 4.0 * noise + 0.15 * contrast + 6.0
 }
 
-/// By how much the support at a point differs from the one by its brightness alone: the share of the
-/// target in a mixture with what is behind. Unlike hits, which are whole points, this measures fractions of a
-/// pixel at an edge. Points where the layers are too alike to decide are left out.
+/// Difference of the support from that by brightness alone, the target's share of a mixture; it resolves
+/// fractions of a pixel at edges. Points where the layers are too alike are left out.
 fn mismatch(a: f64, seen: f64, bright: f64, behind: f64, noise: f64) -> f64 {
     let contrast = bright - behind;
     if contrast.abs() > 4.0 * noise && !seen.is_nan() {
@@ -73,7 +69,6 @@ fn mismatch(a: f64, seen: f64, bright: f64, behind: f64, noise: f64) -> f64 {
     }
 }
 
-/// Visibility, and look-alikes beside the target.
 pub(super) fn score(target: &Target, view: &View, gain: f64, noise: f64) -> Score {
     let near = target.near();
     let (mut hit, mut all, mut area) = (0.0, 0.0, 0.0);

@@ -14,9 +14,8 @@ const MIN_SHARE_IN_PICTURE: f64 = 0.4;
 /// Most points that are compared at each place.
 const MAX_POINTS: usize = 400;
 
-/// The pose within `reach` px whose picture is most like the target and least like the background: least
-/// `mean(min(|E - g T|, 30)) - 0.5 mean(min(|E - Bg|, 30))`. Places are given up as soon as they cannot be
-/// the best.
+/// Pose within `reach` px with the least `mean(min(|E - g T|, 30)) - 0.5 mean(min(|E - Bg|, 30))`. Places are
+/// given up as soon as they cannot be the best.
 pub(super) fn search(
     frame: &Frame<f64>,
     target: &Target,
@@ -50,8 +49,7 @@ pub(super) fn search(
     best.map(|(_, pose)| pose)
 }
 
-/// The figure that is least at the target; `None` where too little of it would be in the picture, or where it
-/// cannot be less than `least`.
+/// Cost of a place; `None` if too little of it is in the picture, or if it cannot be less than `least`.
 fn cost(
     frame: &Frame<f64>,
     background: &Background,
@@ -83,7 +81,6 @@ fn cost(
     Some(own / count as f64 - LIKE_BEHIND * if known > 0 { behind / known as f64 } else { 0.0 })
 }
 
-/// Brightness at the nearest pixel, or between pixels at the border.
 #[inline(always)]
 fn nearest(frame: &Frame<f64>, [x, y]: [f64; 2]) -> f64 {
     let (i, j) = ((x + 0.5) as usize, (y + 0.5) as usize);

@@ -26,7 +26,6 @@ pub(super) const MIN_SCALE_CHANGE: f64 = 0.04;
 /// Least noise, grey levels.
 pub(super) const MIN_NOISE: f64 = 1.5;
 
-/// One target.
 #[derive(Debug)]
 pub(crate) struct State {
     pub motion_model: MotionModel,
@@ -45,7 +44,6 @@ pub(crate) struct State {
     pub last_good: Option<LastGood>,
 }
 
-/// Where the target is, and how it moves.
 #[derive(Debug)]
 pub(super) struct Motion {
     pub pose: Pose,
@@ -73,7 +71,6 @@ pub(super) struct Scene {
     pub buffer: Vec<f64>,
 }
 
-/// What was seen of the target so far.
 #[derive(Debug)]
 pub(super) struct History {
     /// Frames measured.
@@ -106,7 +103,6 @@ pub(super) struct Uncertainty {
     pub noise_to_contrast: f64,
 }
 
-/// The target when it was last seen whole.
 #[derive(Debug, Clone)]
 pub(super) struct LastGood {
     pub filter: GaussMarkovFilter,

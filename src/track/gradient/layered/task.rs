@@ -60,7 +60,6 @@ pub(super) enum VoteMask {
     Towards([f64; 2]),
 }
 
-/// A task of alignment.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Task<'a> {
     pub frame: &'a Frame<f64>,
@@ -75,7 +74,6 @@ pub(super) struct Task<'a> {
     pub levels: &'a [f64],
 }
 
-/// A vote of a node.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Vote {
     pub residual: f64,

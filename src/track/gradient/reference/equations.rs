@@ -9,8 +9,7 @@ use crate::types::Frame;
 /// Products of derivatives: `xx, xy, yy, xt, yt, tt`.
 type Products = [f64; 6];
 
-/// `G'G`, `G'b` and `b'b` of the windows around all pixels; NaN where a window reaches over the border or
-/// holds NaN.
+/// `G'G`, `G'b` and `b'b` of the windows around all pixels; NaN where a window is incomplete.
 pub(super) struct Equations {
     sums: Frame<Products>,
     /// Equations in a window.
@@ -50,8 +49,7 @@ impl Equations {
     }
 }
 
-/// Products of the derivatives at a pixel, along x and y of the mean of both frames and by time of their
-/// difference; NaN beside the border.
+/// Products of derivatives: x and y of the mean of both frames, t of their difference; NaN at the border.
 fn products(first: &Frame<f64>, warped: &Frame<f64>, kernels: &DerivativeKernels, [x, y]: [usize; 2]) -> Products {
     let (width, height) = first.size();
     if x < REACH || y < REACH || x + REACH >= width || y + REACH >= height {

@@ -1,9 +1,7 @@
-//! How far what moves reaches: where a target is whose middle does not show it.
+//! Place of a target from the ends of what moves.
 //!
-//! Of an even target only the outline moves, some of it more plainly than the rest, and the mean of that is
-//! not its middle; of one that is partly beyond the border, the mean of what is left is not either. Its two
-//! ends along either axis are: the middle between them, or, where one is missing, the other one and how far
-//! apart they usually are.
+//! Of an even target only the outline moves, and beyond the border a part is missing: the mean of what moves
+//! is not its middle. That lies between the ends, or at half their usual distance from one of them.
 
 use super::local_flow::LocalFlow;
 
@@ -36,7 +34,6 @@ pub(super) fn ends(flow: &LocalFlow, eps: f64) -> Option<Ends> {
     })
 }
 
-/// Place up to which so many lie, where each pixel's are spread evenly over it.
 fn quantile(counts: &[f64], share: f64) -> f64 {
     let mut sum = 0.0;
     for (at, count) in counts.iter().enumerate() {

@@ -32,14 +32,12 @@ pub struct MeanFlow {
 }
 
 impl LocalFlowOptions {
-    /// The weakest gradient that counts between these frames.
     pub(super) fn least(&self, first: &Frame<f64>, second: &Frame<f64>) -> f64 {
         if self.min_sigma > 0.0 { self.min_sigma.max(OVER_NOISE * noise_of(first, second, NOISE_SAMPLES)) } else { 0.0 }
     }
 
-    /// Flow from the better of two starts (25): none, and a velocity that all pixels may have. One correction
-    /// (7) is made. Windows with gradients up to `flat`, grey levels/px, are flat: their condition number (8)
-    /// is infinite.
+    /// Flow from the better of two starts (25), none and a common velocity, with one correction (7). Windows
+    /// with gradients up to `flat`, grey levels/px, have an infinite condition number (8).
     pub(super) fn flow_from(
         &self,
         first: &Frame<f64>,

@@ -22,13 +22,11 @@ const MIN_MOVING_PIXELS: usize = 12;
 const MAX_INNOVATION: f64 = 16.0;
 /// Refusals in a row after which a measurement is taken all the same.
 const MAX_REFUSALS: usize = 3;
-/// Variance of the position and velocity of what is too fast for local flow, px^2: whole pixels, an outline
-/// of changed ones.
+/// Variance of position and velocity of a target too fast for local flow, px^2: whole pixels.
 const FAST: f64 = 1.0;
 /// Its sides differ from the target's by less than this factor.
 const MAX_SIDE_RATIO: f64 = 1.6;
-/// How fast the usual count of moving pixels follows a larger one, and a smaller one: parts are hidden more
-/// often than they grow.
+/// Rates of the usual count of moving pixels, up and down: parts are hidden more often than they grow.
 const USUAL: [f64; 2] = [0.1, 0.03];
 /// Share of the usual count from which on all of the target is seen: counts scatter.
 const WHOLE: f64 = 0.85;
@@ -46,13 +44,10 @@ const MAX_MISSED_FRAMES: usize = 15;
 /// Least automatic `min_speed`, px/frame.
 const MIN_SPEED: f64 = 0.3;
 
-/// Moving pixels around the target, over those of all that moves, from which on they are more than a few
-/// outliers.
+/// Share of all moving pixels around the target from which on they are more than a few outliers.
 const ALL: f64 = 0.25;
-/// What is said where what is around the target moves as well.
 const ALL_MOVES: &str = "all around the target moves, too";
 
-/// Measurement of a pair of windows.
 #[derive(Debug, Clone, Copy)]
 struct Measured {
     mean: MeanFlow,
@@ -61,7 +56,6 @@ struct Measured {
     all_moves: bool,
 }
 
-/// One target in the loop.
 #[derive(Debug)]
 pub(in crate::track::gradient) struct LocalLoop {
     rules: Rules,
@@ -191,10 +185,9 @@ impl LocalLoop {
         }
     }
 
-    /// Where the target is by what moves, and the deviations of that along x and y beyond what noise makes,
-    /// px, where a share of what usually moves is `missing`: the middle between its ends, or the mean where
-    /// these are not the target's alone. Outlines are what moves, so that a side that is hidden takes its
-    /// quarter of the mean from far out.
+    /// Position of the target and its standard deviations along x and y beyond noise, px, where a share is
+    /// `missing`: the middle between the ends, or the mean if these are not its own. A hidden side takes its
+    /// quarter of the outline from the mean.
     fn place(&self, mean: &MeanFlow, ends: Option<&Ends>, missing: f64) -> ([f64; 2], [f64; 2]) {
         let of_mean = [0, 1].map(|k| mean.centroid[k] + self.rules.brought * mean.velocity[k]);
         let Some(ends) = ends else { return (of_mean, self.size.map(|length| missing * length)) };
@@ -205,8 +198,7 @@ impl LocalLoop {
         ([0, 1].map(|k| between[k].map_or(of_mean[k], |middle| middle.at)), [0, 1].map(lean))
     }
 
-    /// Deviations of the mean flow from the target's along x and y, px/frame, where a share of what usually
-    /// moves is `missing`.
+    /// Standard deviations of the mean flow from the target's, px/frame, where a share is `missing`.
     fn slip(&self, missing: f64) -> [f64; 2] {
         self.filter.speed().map(|speed| SLIP * missing * speed.abs().max(MIN_SLIP_SPEED))
     }
@@ -216,7 +208,6 @@ impl LocalLoop {
         if self.usual > 0.0 { (count as f64 / (WHOLE * self.usual)).min(1.0) } else { 1.0 }
     }
 
-    /// Remembers how many pixels of the target moved.
     fn count(&mut self, count: usize) {
         self.seen = self.share(count);
         let count_now = count as f64;
@@ -224,8 +215,7 @@ impl LocalLoop {
         self.usual += gain * (count_now - self.usual);
     }
 
-    /// A target that moves farther from what is expected than local flow reaches, seen in the `second`
-    /// window.
+    /// A target farther from the prediction than local flow reaches; `second`: the window of this frame.
     fn too_fast(&self, second: &Frame<f64>) -> Option<Measurement> {
         let (corner, expected, speed) = (self.corner(), self.filter.position(), self.filter.speed());
         let near = [0, 1].map(|k| expected[k] - corner[k]);
@@ -240,7 +230,6 @@ impl LocalLoop {
         })
     }
 
-    /// What moves in the window between the last frame and the `second`, which is that of this one.
     fn measure(&self, second: &Frame<f64>) -> Measured {
         let first = &self.before;
         let velocity = self.filter.speed();
@@ -259,7 +248,6 @@ impl LocalLoop {
         Measured { mean, ends, all_moves }
     }
 
-    /// Centre of the window that is cut.
     fn window_center(&self) -> [f64; 2] {
         match self.control {
             Control::Integer => self.window_center.map(|at| (at + 0.5).floor()),
@@ -267,7 +255,6 @@ impl LocalLoop {
         }
     }
 
-    /// Upper left pixel of what is cut out, margin included.
     fn corner(&self) -> [f64; 2] {
         self.window_center().map(|at| at - (self.search_window / 2 + MARGIN) as f64)
     }
@@ -289,7 +276,6 @@ impl LocalLoop {
         })
     }
 
-    /// Only pixels of the window itself count.
     fn keep_window(&self, flow: &mut LocalFlow) {
         let inside = MARGIN..MARGIN + self.search_window;
         let (width, height) = flow.accepted.size();
@@ -308,8 +294,7 @@ impl LocalLoop {
         (3.0 * robust_std(&mut sizes).unwrap_or(0.0)).max(MIN_SPEED)
     }
 
-    /// Whether most of what is around the target moves, and is a good part of all that does: the camera
-    /// moves, or the window shows another object.
+    /// Whether much around the target moves: the camera moves, or the window shows another object.
     fn all_moves(&self, flow: &LocalFlow, mean: &MeanFlow, min_speed: f64) -> bool {
         let (mut moving, mut all) = (0, 0);
         for w in self.around(flow) {
@@ -377,16 +362,13 @@ const MIN_SEARCH_WINDOW: usize = 51;
 /// Side of the window over that of a large target.
 const SEARCH_WINDOW_PER_TARGET: f64 = 1.6;
 
-/// Side of the window, px: as wanted, or as the target needs it. Beyond the frame there is nothing, and a
-/// window has a middle.
+/// Odd side of the window, px: as requested, or as the target needs it; at most twice that of the frame.
 fn side(wanted: Option<usize>, bounds: TargetBox, (width, height): (usize, usize)) -> usize {
     let needed = (SEARCH_WINDOW_PER_TARGET * bounds.width.max(bounds.height)) as usize;
     wanted.unwrap_or(needed.max(MIN_SEARCH_WINDOW)).min(2 * width.max(height)) | 1
 }
 
-/// A square of the frame from a corner on; NaN outside.
 fn whole_pixels(frame: &Frame<f64>, corner: [isize; 2], side: usize) -> Frame<f64> {
-    // Columns or rows of the square that are in the frame.
     let within = |corner: isize, length: usize| {
         let first = (-corner).clamp(0, side as isize);
         let end = (length as isize - corner).clamp(first, side as isize);

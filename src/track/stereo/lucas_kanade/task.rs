@@ -60,8 +60,7 @@ impl<'a> Task<'a> {
         Some(PlaneMotion { flow, centre: self.centre, residual: truncated_mean(&residuals) })
     }
 
-    /// One Gauss-Newton step of the first `N` unknowns (2: translation, 6: affine) from residuals with a
-    /// standard deviation. Returns its length, px.
+    /// One Gauss-Newton step of the first `N` unknowns (2: translation, 6: affine). Returns its length, px.
     fn step<const N: usize>(
         &self,
         voters: &[Voter],
@@ -145,8 +144,7 @@ impl<'a> Task<'a> {
         voters
     }
 
-    /// Residuals: brightness after the motion less that before, NaN outside. Returns their robust standard
-    /// deviation; `None` unless half of the pixels are inside.
+    /// Residuals after the motion, NaN outside, and their robust scale; `None` unless half are inside.
     fn residuals(&self, voters: &[Voter], after: &Frame<f32>, map: &[f64; 6], out: &mut Vec<f32>) -> Option<f64> {
         let (width, height) = after.size();
         let (last_x, last_y) = ((width - 1) as f32, (height - 1) as f32);

@@ -141,7 +141,6 @@ impl StereoTracker {
         Ok((step, ObservedStep { clusters, luminance, levels: Some(levels) }, posterior))
     }
 
-    /// Motion of a cluster of the last step, at its middle.
     fn departure(&self, k: usize, motion: ClusterMotion) -> Option<Departure> {
         let affine = motion.affine_at(self.graph.node(self.time.checked_sub(1)?, k)?.middle);
         Some(Departure { motion: [affine[0], affine[1], motion.depth], affine: Some(affine) })

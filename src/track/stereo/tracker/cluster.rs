@@ -7,7 +7,6 @@ use super::StereoTracker;
 use crate::error::Result;
 use crate::mixture::{Fit, Points, Posterior, Start, fit};
 
-/// Result of clustering.
 pub(super) struct Clustered {
     pub clusters: Clusters,
     pub posterior: Option<Posterior>,
@@ -22,7 +21,6 @@ impl Clustered {
         Ok(Self { clusters, rounds: fitted.lower_bounds.len(), posterior: Some(fitted.posterior) })
     }
 
-    /// A step without voxels.
     fn nothing(points: EdgePoints, voxels: Voxels) -> Self {
         Self { clusters: Clusters::new(points, voxels, &[], 0), posterior: None, rounds: 0 }
     }
@@ -61,9 +59,8 @@ impl StereoTracker {
             let fitted = without(&start, &outliers)?;
             return Ok((Clustered::new(points, voxels, fitted, &weighted)?, seeds));
         }
-        // A cold start splits large objects, and misses small ones or merges two of them; components that
-        // explain little are better used there. A new seed may turn out to be a piece of a larger object
-        // after the fit; then nothing is seeded again.
+        // A cold start splits large objects and misses or merges small ones: components that explain little
+        // are seeded again, unless a new seed is a piece of a larger object after the fit.
         let mut fitted = fit(&weighted, &self.options.mixture_options(false, self.time), Start::Seeds)?;
         let mut left_out = vec![];
         for seeding in [true, false] {

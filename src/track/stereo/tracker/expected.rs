@@ -13,9 +13,8 @@ use super::StereoTracker;
 use crate::mixture::Points;
 
 impl StereoTracker {
-    /// A guess of the motion of each component, px: that of the component which explains its middle best
-    /// after itself, probably of the same object. A new cluster has few pixels, often along one edge, which
-    /// agree with many motions.
+    /// Guess of each component's motion, px: that of the component which explains its middle best after
+    /// itself. A new cluster has few pixels, often along one edge, which agree with many motions.
     fn guesses(&self, cell: [f64; 3], components: usize) -> Vec<Option<[f64; 2]>> {
         let gap = self.clock.gap;
         let known: Vec<(usize, [f64; 2])> = (0..components)
@@ -28,8 +27,7 @@ impl StereoTracker {
         (0..components).map(guess).collect()
     }
 
-    /// The motion of that component, of those whose motion is known, which explains the middle of component
-    /// `k` best after itself.
+    /// Known motion of the component which explains the middle of component `k` best after itself.
     fn beside(&self, k: usize, known: &[(usize, [f64; 2])]) -> Option<[f64; 2]> {
         let posterior = self.posterior.as_ref()?;
         let others: Vec<(usize, [f64; 2])> = known.iter().copied().filter(|(other, _)| *other != k).collect();
@@ -94,7 +92,6 @@ impl StereoTracker {
         (0..last.clusters.components()).map(|k| (!last.clusters.pixels[k].is_empty()).then(|| still(k))).collect()
     }
 
-    /// Motion of each cluster to the next view.
     pub(super) fn carry(&mut self, view: NextView<'_>) -> Vec<Option<(ClusterMotion, Carried)>> {
         let Some(last) = &self.last else { return vec![] };
         let (cell, gap) = (last.clusters.lattice().cell(), self.clock.gap);

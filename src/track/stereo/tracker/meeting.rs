@@ -10,7 +10,6 @@ use super::super::succession::successors;
 use super::StereoTracker;
 use super::cluster::Clustered;
 
-/// Overlaps of two steps' clusters, forwards and backwards.
 type Overlaps = (Vec<Row>, Vec<Row>);
 
 impl StereoTracker {
@@ -39,7 +38,6 @@ impl StereoTracker {
     }
 }
 
-/// Overlaps of moved clusters forwards, and backwards by the same motions.
 fn both_ways(before: &Clusters, after: &Clusters, motions: &[Option<ClusterMotion>]) -> Overlaps {
     let forward: Vec<Row> = (0..before.components())
         .map(|k| match motions[k] {

@@ -34,8 +34,7 @@ impl Arrival {
     pub const UNKNOWN: Self = Self { motion: None, affine: None, residual: None, coasting: false };
 }
 impl StereoTracker {
-    /// Paper mode: a cluster continues the track of another if each is the other's strongest arc, with a
-    /// sufficient score.
+    /// Paper mode: a cluster continues the track of its mutual strongest arc, with a sufficient score.
     pub(super) fn associate_by_arcs(&mut self, clusters: &Clusters, arcs: &[Arc]) {
         let components = clusters.components();
         let before = std::mem::take(&mut self.association.live);
@@ -67,8 +66,7 @@ impl StereoTracker {
         self.association.associate(self.clock, &seen, MIN_COMPONENT_PIXELS, Some(&Recognition::default()));
     }
 
-    /// Adds the clusters to graph and tracks, and assembles the step from how each arrived and its middle,
-    /// px.
+    /// Adds the clusters to graph and tracks, and assembles the step.
     pub(super) fn record(
         &mut self,
         clusters: &Clusters,
@@ -175,8 +173,7 @@ fn sightings(clusters: &Clusters, place: impl Fn(usize) -> ([f64; 3], [f64; 2]))
     pixels.map(sighting).collect()
 }
 
-/// Medians of a cluster's pixels along x, y and depth, and their median absolute deviations along x and y,
-/// cells and layers.
+/// Medians along x, y and depth, and median absolute deviations along x and y; cells and layers.
 fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 2]) {
     let places: Vec<[f64; 3]> =
         clusters.pixels[k].iter().map(|&i| clusters.lattice().cells_of(clusters.points.at(i as usize))).collect();
@@ -186,8 +183,7 @@ fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 2]) {
     (middle, std::array::from_fn(off))
 }
 
-/// Mean of a component along x and y, px, and the median disparity of its pixels, which layers do not
-/// quantise.
+/// Mean of a component along x and y, px, and its median disparity, which layers do not quantise.
 fn mean(clusters: &Clusters, posterior: &Posterior, k: usize) -> [f64; 3] {
     let [x, y, d] = clusters.lattice().pixels_of(std::array::from_fn(|i| posterior.means[3 * k + i]));
     [x, y, clusters.disparity(k).unwrap_or(d)]

@@ -32,7 +32,6 @@ pub(super) fn log_density(share: f64, covariance: &Matrix3<f64>) -> f64 {
     share.ln() - 0.5 * (D as f64 + (std::f64::consts::TAU.powi(D as i32) * covariance.determinant()).ln())
 }
 
-/// Neighbouring voxels.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Blob {
     /// The voxels.

@@ -13,14 +13,11 @@ const MIN_SPLIT_GAIN: f64 = 1.0;
 /// pieces of an evenly covered surface explain it no better than the whole.
 const MAX_MERGE_LOSS: f64 = 0.1;
 
-/// Merges pieces of a surface, and splits components that hold small objects far apart; EM iterations do
-/// neither. The largest gains come first. Returns whether anything changed.
+/// Merges pieces of a surface and splits components of distant small objects, largest gains first; EM does
+/// neither. Returns whether anything changed.
 ///
-/// Unmerged pieces may become one component later, with either track, and leave no component for small or
-/// appearing objects.
-///
-/// # Errors
-/// Those of the mixture.
+/// Unmerged pieces may become one component later, with either track, and leave none for small or new
+/// objects.
 pub(in super::super) fn split_and_merge(posterior: &mut Posterior, voxels: &Voxels, points: &Points) -> Result<bool> {
     let labels = posterior.labels(points)?;
     let mut members = vec![vec![]; posterior.components()];
@@ -61,7 +58,6 @@ fn touching(voxels: &Voxels, labels: &[u32], components: usize) -> Vec<Vec<bool>
     touch
 }
 
-/// Separate parts of a component.
 struct Split {
     /// The largest first.
     blobs: Vec<Blob>,
@@ -99,7 +95,6 @@ impl Pool {
         Self { wholes, touch, pieces, idle: idle.into_iter().collect(), changed: BTreeSet::new() }
     }
 
-    /// Excludes a component from merges.
     fn exclude(&mut self, k: usize) {
         self.pieces.retain(|&piece| piece != k);
     }
@@ -109,8 +104,7 @@ impl Pool {
         self.changed.insert(k);
     }
 
-    /// Gives each part of component `k` a component, the largest its own, while a free one costs less than is
-    /// gained; the other parts stay with the largest.
+    /// Gives each part a component, the largest its own, while a free one costs less than the gain.
     fn split(&mut self, k: usize, Split { blobs, gain }: Split) {
         let mut left = gain * blobs.iter().map(|part| part.pixels).sum::<f64>();
         let mut blobs = blobs.into_iter();
@@ -167,7 +161,6 @@ impl Pool {
         losses.min_by(|a, b| a.0.total_cmp(&b.0))
     }
 
-    /// Merges two components; the second becomes idle.
     fn merge(&mut self, [kept, freed]: [usize; 2]) {
         let mut joined = std::mem::take(&mut self.wholes[freed]);
         joined.join(&self.wholes[kept]);
