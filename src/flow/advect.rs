@@ -79,7 +79,6 @@ fn deformed(matrix: &PointCovariance, there: &Between) -> PointCovariance {
     })
 }
 
-/// A field's sites as a grid.
 struct Lattice {
     origin: [f64; 2],
     stride: f64,

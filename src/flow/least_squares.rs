@@ -73,7 +73,6 @@ struct Factors<const N: usize, const P: usize> {
     tau: [f64; P],
     /// Columns of W, each as an array.
     w: [[f64; P]; P],
-    /// Columns of V.
     v: [[f64; P]; P],
     sigma: [f64; P],
 }

@@ -61,7 +61,6 @@ pub struct MethodInfo {
     pub chooses_window: bool,
 }
 
-/// What most methods are.
 const USUAL: MethodInfo = MethodInfo {
     name: "",
     options: &[],

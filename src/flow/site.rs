@@ -16,15 +16,10 @@ pub(super) struct FieldBand<'a, T> {
     pub motion: Vec<&'a mut [T]>,
     /// One slice a pair of parameters, or none.
     pub covariance: Vec<&'a mut [T]>,
-    /// One slice a pair of parameters, or none.
     pub systematic: Vec<&'a mut [T]>,
-    /// Status.
     pub status: &'a mut [Status],
-    /// Root mean square residual.
     pub residual: Option<&'a mut [T]>,
-    /// Rank.
     pub rank: Option<&'a mut [u8]>,
-    /// Condition number.
     pub condition: Option<&'a mut [T]>,
     /// Window of the slopes.
     pub window: Option<&'a mut [T]>,
@@ -73,7 +68,6 @@ pub(super) struct MaskCounts {
 }
 
 impl MaskCounts {
-    /// The running sums of the masked pixels.
     pub fn new(mask: &Mask) -> Self {
         let (width, height) = mask.size();
         let stride = width + 1;

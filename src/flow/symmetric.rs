@@ -27,7 +27,6 @@ pub(crate) struct Factor<V> {
     /// The smallest of: the pivots of the scaled matrix (what of a column, squared, is independent of those
     /// before it), and the columns' squares in relation to the largest.
     pub quality: V,
-    /// The largest diagonal entry.
     pub largest: V,
 }
 

@@ -89,7 +89,6 @@ impl<T: SimdReal> Places<'_, T> {
         sum + sums[3].mul_add(across[3], sums[2] * across[2])
     }
 
-    /// One place.
     fn single(&self, x: T, y: T) -> T {
         cubic_at(self.frame, x.to_f64() - self.origin[0], y.to_f64() - self.origin[1])
     }

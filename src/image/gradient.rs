@@ -52,7 +52,6 @@ pub fn gaussian_gradient<T: SimdReal>(
     (along_x, along_y)
 }
 
-/// One band of both results.
 struct Band<'a, T> {
     frame: &'a Frame<T>,
     weights: &'a Weights<T>,
@@ -66,7 +65,6 @@ impl<T: SimdReal> Kernel<T> for Band<'_, T> {
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        // A row narrower than one vector is left to single lanes.
         if self.frame.width() < V::LANES { self.rows::<T>() } else { self.rows::<V>() }
     }
 }

@@ -52,7 +52,6 @@ pub fn halve_into<T: SimdReal>(level: Level, frame: &Frame<T>, out: &mut Frame<T
     });
 }
 
-/// One band of the result.
 struct Band<'a, T> {
     frame: &'a Frame<T>,
     /// Weights of the taps at distance 0, 1, 2, 3.
@@ -66,7 +65,6 @@ impl<T: SimdReal> Kernel<T> for Band<'_, T> {
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        // A row narrower than one vector is left to single lanes.
         if self.frame.width().div_ceil(2) < V::LANES { self.rows::<T>() } else { self.rows::<V>() }
     }
 }

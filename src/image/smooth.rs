@@ -166,7 +166,6 @@ impl<T: SimdReal> Kernel<T> for BandConvolution<'_, T> {
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        // A row narrower than one vector is left to single lanes.
         if self.width < V::LANES { self.rows::<T>() } else { self.rows::<V>() }
     }
 }

@@ -16,7 +16,6 @@ pub struct JetPlanes<T> {
 }
 
 impl<T: Real> JetPlanes<T> {
-    /// Planes of NaN.
     fn empty((width, height): (usize, usize)) -> Self {
         Self { planes: std::array::from_fn(|_| Frame::filled(width, height, T::nan())) }
     }

@@ -12,7 +12,6 @@ pub(crate) fn starts(range: std::ops::Range<usize>, lanes: usize) -> Starts {
     Starts { next: range.start, last: if fits { range.end - lanes } else { 0 }, lanes, done: !fits }
 }
 
-/// See [`starts`].
 pub(crate) struct Starts {
     next: usize,
     last: usize,
@@ -53,7 +52,6 @@ enum Form<T> {
 }
 
 impl<T: SimdReal> JetRows<T> {
-    /// The rows of `stencil`.
     pub fn new(stencil: &JetStencil) -> Self {
         let cast = |v: &[f64]| v.iter().map(|&w| T::from_f64(w)).collect::<Vec<T>>();
         let form = match stencil.separable() {

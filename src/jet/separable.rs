@@ -16,7 +16,6 @@ pub(super) struct Axis {
     pub a: f64,
     /// `p2 = x^2 - b x - c`.
     pub b: f64,
-    /// See `b`.
     pub c: f64,
 }
 

@@ -45,9 +45,8 @@ pub(super) struct BrightnessScale {
 }
 
 impl BrightnessScale {
-    /// From the finite, unmasked samples of the frames: their middle nine tenths, since a single no-data
-    /// value may be 1e9, but at least a share of the trimmed extent, since pictures may be dark but for a few
-    /// spots.
+    /// From the finite, unmasked samples: their middle nine tenths, since a single no-data value may be 1e9,
+    /// but at least a share of the trimmed extent, since pictures may be dark but for a few spots.
     pub fn of<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&Mask>) -> Self {
         let allowed = |at: usize| mask.is_none_or(|mask| mask.data().get(at).copied().unwrap_or(true));
         let mut values: Vec<f64> = Vec::new();

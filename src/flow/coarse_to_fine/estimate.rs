@@ -17,7 +17,6 @@ pub(super) struct Estimate<T> {
     pub motion: Planes<T>,
     /// Summary of the last data term.
     pub data: Planes<T>,
-    /// Scaling of the brightness.
     pub brightness: BrightnessScale,
     /// Statistics by which windows were chosen; `None` without sites.
     pub statistics: Option<WindowStatistics<T>>,
@@ -30,7 +29,6 @@ pub(super) struct Estimate<T> {
 }
 
 impl<T: SimdReal> Estimate<T> {
-    /// All planes.
     pub fn planes_mut(&mut self) -> impl Iterator<Item = &mut Planes<T>> {
         let statistics =
             self.statistics.iter_mut().chain(&mut self.acceleration).flat_map(WindowStatistics::planes_mut);

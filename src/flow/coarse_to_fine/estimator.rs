@@ -17,7 +17,6 @@ use crate::flow::options::EstimatorOptions;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame};
 
-/// The estimator for checked options.
 #[derive(Debug)]
 pub(in crate::flow) struct CoarseToFine {
     options: CoarseToFineOptions,
@@ -25,7 +24,6 @@ pub(in crate::flow) struct CoarseToFine {
 }
 
 impl CoarseToFine {
-    /// Checks the options.
     pub fn new(options: &CoarseToFineOptions) -> Result<Self> {
         options.check()?;
         Ok(Self { options: options.clone(), store: WorkspaceStore::default() })
@@ -36,7 +34,6 @@ impl CoarseToFine {
         self.options.frames
     }
 
-    /// Which of the frames the estimate belongs to.
     pub fn frame(&self) -> usize {
         self.options.frames - 2
     }
@@ -88,7 +85,6 @@ fn covariance_of<T: SimdReal>(
     Some(covariance_of)
 }
 
-/// Motion of two or three frames from the filled pyramid.
 fn estimate<T: SimdReal>(
     plan: &DescentPlan,
     is_triple: bool,

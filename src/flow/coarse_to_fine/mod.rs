@@ -46,8 +46,7 @@ pub(super) use estimator::CoarseToFine;
 pub use options::{CoarseToFineOptions, MIN_LEVEL_SIDE, Preset};
 
 /// Distance, px, over which errors of neighbouring estimates from `frames` frames are correlated: that of
-/// wide windows, so that means over regions are not given too small a standard deviation. Three frames have a
-/// longer one, since their windows are chosen a second time in a motion that is already smooth.
+/// wide windows. Windows of three frames are chosen a second time, in a motion that is already smooth.
 pub(super) fn correlation_length(frames: usize) -> f64 {
     if frames == 3 { 17.0 } else { 8.0 }
 }

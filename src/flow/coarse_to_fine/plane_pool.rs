@@ -7,7 +7,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Maximum size, bytes, of a workspace that is kept after its estimator: that of a frame of 800,000 px.
 pub(super) const MAX_KEPT_BYTES: usize = 64 << 20;
 
-/// Free planes.
 #[derive(Debug, Default)]
 pub(super) struct PlanePool<T> {
     free: Mutex<Vec<Planes<T>>>,
@@ -26,7 +25,6 @@ impl<T: SimdReal> PlanePool<T> {
         planes
     }
 
-    /// Returns planes to the pool.
     pub fn keep(&self, planes: Planes<T>) {
         if planes.room() > 0 {
             lock(&self.free).push(planes);
@@ -40,7 +38,6 @@ impl<T: SimdReal> PlanePool<T> {
         }
     }
 
-    /// Frees all planes of the pool.
     pub fn clear(&self) {
         lock(&self.free).clear();
     }

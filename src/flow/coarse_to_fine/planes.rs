@@ -17,7 +17,6 @@ pub(super) const CHUNK: usize = 32;
 pub(super) struct Planes<T> {
     pub width: usize,
     pub height: usize,
-    /// Number of planes.
     pub count: usize,
     data: Vec<T>,
 }
@@ -41,7 +40,6 @@ impl<T: SimdReal> Planes<T> {
         }
     }
 
-    /// Frees memory beyond the content.
     pub fn shrink(&mut self) {
         self.data.truncate(self.row_len() * self.height);
         self.data.shrink_to_fit();
@@ -77,13 +75,11 @@ impl<T: SimdReal> Planes<T> {
         &self.data[y * self.row_len()..(y + 1) * self.row_len()]
     }
 
-    /// As [`Planes::row`].
     pub fn row_mut(&mut self, y: usize) -> &mut [T] {
         let len = self.row_len();
         &mut self.data[y * len..(y + 1) * len]
     }
 
-    /// All samples, row after row.
     pub fn data(&self) -> &[T] {
         &self.data[..self.row_len() * self.height]
     }
@@ -94,19 +90,16 @@ impl<T: SimdReal> Planes<T> {
         &mut self.data[..len]
     }
 
-    /// The sites of row `y` of plane `k`.
     pub fn line(&self, k: usize, y: usize) -> &[T] {
         let first = k * self.stride() + LEFT;
         &self.row(y)[first..first + self.width]
     }
 
-    /// As [`Planes::line`].
     pub fn line_mut(&mut self, k: usize, y: usize) -> &mut [T] {
         let (first, width) = (k * self.stride() + LEFT, self.width);
         &mut self.row_mut(y)[first..first + width]
     }
 
-    /// The value of plane `k` at a site.
     pub fn at(&self, k: usize, x: usize, y: usize) -> T {
         self.line(k, y)[x]
     }

@@ -8,7 +8,6 @@ use crate::simd::{Level, SimdReal};
 use crate::types::{Frame, Mask};
 use rayon::prelude::*;
 
-/// Samples of a parallel task.
 const CHUNK: usize = 1 << 16;
 
 /// Distance, px, over which an unusable sample affects jets: half the taps of spline and stencils.
@@ -18,7 +17,6 @@ const MIN_USABLE_OF_49: usize = 40;
 /// Minimum usable pixels of nine, on levels that only hand motion down: keeps small areas.
 const MIN_USABLE_OF_9: usize = 6;
 
-/// Which frames are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ComparedFrames {
     /// All, warped towards the middle of their times.
@@ -56,12 +54,10 @@ impl<T: SimdReal> PyramidLevel<T> {
 #[derive(Debug, Default)]
 pub(super) struct Pyramid<T> {
     levels: Vec<PyramidLevel<T>>,
-    /// Levels in use.
     count: usize,
 }
 
 impl<T: SimdReal> Pyramid<T> {
-    /// The levels, the finest first.
     pub fn levels(&self) -> &[PyramidLevel<T>] {
         &self.levels[..self.count]
     }
@@ -71,9 +67,9 @@ impl<T: SimdReal> Pyramid<T> {
         self.levels.iter().map(|level| (1 + level.splines.len()) * level.size.0 * level.size.1).sum()
     }
 
-    /// Builds the levels of `frames` (of one size): at most `max_levels`, none below
-    /// [`MIN_LEVEL_SIDE`](super::MIN_LEVEL_SIDE) px. Returns the finest level that can be warped: `finest`,
-    /// or the coarsest there is.
+    /// Builds at most `max_levels` levels of `frames` (of one size), none below
+    /// [`MIN_LEVEL_SIDE`](super::MIN_LEVEL_SIDE) px. Returns the finest level that can be warped:
+    /// `finest`, or the coarsest there is.
     pub fn fill(
         &mut self,
         simd: Level,
@@ -120,7 +116,6 @@ impl<T: SimdReal> Pyramid<T> {
     }
 }
 
-/// Number of levels of frames of `size`.
 fn count(size: (usize, usize), max_levels: Option<usize>) -> usize {
     let (mut side, mut count) = (size.0.min(size.1), 1);
     while max_levels.is_none_or(|max_levels| count < max_levels) && side.div_ceil(2) >= MIN_LEVEL_SIDE {
@@ -129,7 +124,6 @@ fn count(size: (usize, usize), max_levels: Option<usize>) -> usize {
     count
 }
 
-/// Scales the brightness.
 fn scale<T: SimdReal>(from: &Frame<T>, brightness: BrightnessScale, to: &mut Frame<T>) {
     if to.size() != from.size() {
         *to = Frame::filled(from.width(), from.height(), T::from_f64(0.0));

@@ -21,9 +21,8 @@ pub(super) struct Schedule {
     pub finest_sweeps: usize,
     /// Levels above the finest from which the unregularised trial is run (small objects); `None`: never.
     pub trial_from: Option<usize>,
-    /// Whether the motion one level above the finest is refined before it is carried down: it then has less
-    /// noise, and slopes from wider windows. Not at half resolution, where that level has too few sites to
-    /// choose windows.
+    /// Whether the motion one level above the finest is refined before it is carried down, for less noise.
+    /// Not at half resolution, where that level has too few sites to choose windows.
     pub refines_intermediate: bool,
 }
 
@@ -36,23 +35,17 @@ const COARSE_SWEEPS: usize = 10;
 /// Maximum break strain on such a level: neighbours are far apart, and under fast rotation move differently.
 const COARSE_BREAK_STRAIN: f64 = 0.07;
 
-/// Iterations and tolerance of one level.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LevelSchedule {
-    /// Maximum number of iterations.
     pub max_iterations: usize,
     /// Root-mean-square change of the flow, px of the level, at which iterations end.
     pub tolerance: f64,
-    /// Smoothness terms and sweeps after each linearisation.
     pub smoothness: Smoothness,
-    /// Whether the unregularised trial follows.
     pub runs_trial: bool,
-    /// Whether the result is refined before the next finer level.
     pub refines: bool,
 }
 
 impl Schedule {
-    /// The schedule of a preset for two or three frames.
     pub fn new(preset: Preset, frames: usize) -> Self {
         let smoothness = Smoothness::default();
         // Three frames have less noise than two: another linearisation pays.

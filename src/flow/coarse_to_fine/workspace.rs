@@ -10,7 +10,6 @@ use crate::simd::SimdReal;
 use std::any::Any;
 use std::sync::Mutex;
 
-/// All memory of one estimate.
 #[derive(Debug, Default)]
 pub(super) struct Workspace<T> {
     pub pyramid: Pyramid<T>,
@@ -25,14 +24,12 @@ impl<T: SimdReal> Workspace<T> {
         self.bytes() > MAX_KEPT_BYTES
     }
 
-    /// Frees unused planes of a large workspace.
     pub fn clear_if_large(&self) {
         if self.is_large() {
             self.clear();
         }
     }
 
-    /// Frees unused planes.
     pub fn clear(&self) {
         self.space.clear();
     }
@@ -57,8 +54,7 @@ impl<T: SimdReal> Workspace<T> {
     }
 }
 
-/// Returns freed memory to the system. The GNU allocator keeps blocks of up to 32 MiB, which is most of ours,
-/// while results are too large to fit in them.
+/// Returns freed memory to the system: the GNU allocator keeps blocks of up to 32 MiB, most of ours.
 fn release_to_system() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     // SAFETY: takes no pointer, and may be called at any time from any thread.
@@ -84,7 +80,6 @@ impl WorkspaceStore {
         any.and_then(|any| any.downcast().ok()).unwrap_or_default()
     }
 
-    /// Keeps a workspace for the next call.
     pub fn put_back<T: SimdReal>(&self, workspace: Box<Workspace<T>>) {
         lock(&self.free).push(workspace);
     }

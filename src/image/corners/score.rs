@@ -48,10 +48,8 @@ pub fn corner_score_into(level: Level, frame: &Frame<f32>, window: usize, score:
     Ok(())
 }
 
-/// One band of the result.
 struct Band<'a> {
     frame: &'a Frame<f32>,
-    /// Half the window.
     radius: usize,
     first_row: usize,
     output: &'a mut [f32],
@@ -65,7 +63,6 @@ impl Kernel<f32> for Band<'_> {
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = f32>>(self) {
-        // A row narrower than one vector is left to single lanes.
         if self.frame.width() < V::LANES { self.rows::<f32>() } else { self.rows::<V>() }
     }
 }
@@ -118,7 +115,6 @@ fn smaller_eigenvalue<V: Lanes>([a, b, c]: [V; 3]) -> V {
     (a + c - apart.mul_add(apart, twice * twice).sqrt()) * V::constant(0.5)
 }
 
-/// Buffers for the slopes of one row.
 struct Slopes {
     radius: usize,
     /// Smoothed 1-2-1 down, and the difference down, with one replicated sample at either end.

@@ -82,7 +82,6 @@ pub fn select_corners(score: &Frame<f32>, existing: &[[f64; 2]], options: &Corne
 /// Minimum number of candidates sorted together.
 const SORTED_AT_ONCE: usize = 256;
 
-/// A local maximum.
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
     score: f32,
@@ -169,7 +168,6 @@ struct CellGrid {
     points: Vec<([f64; 2], u32)>,
 }
 
-/// End of a list.
 const NONE: u32 = u32::MAX;
 
 impl CellGrid {

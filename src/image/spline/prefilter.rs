@@ -55,7 +55,6 @@ fn mirror(index: isize, len: usize) -> usize {
     (last - (index.rem_euclid(2 * last) - last).abs()) as usize
 }
 
-/// One band of coefficient rows.
 struct Band<'a, T> {
     frame: &'a Frame<T>,
     /// The first row, margin included.
@@ -69,7 +68,6 @@ impl<T: SimdReal> Kernel<T> for Band<'_, T> {
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        // A row narrower than one vector is left to single lanes.
         if self.frame.width() < V::LANES { self.filter::<T>() } else { self.filter::<V>() }
     }
 }
@@ -127,7 +125,6 @@ fn down<V: Lanes, const N: usize>(
     }
 }
 
-/// The filter along the rows.
 struct Along<T> {
     /// For each factor the distance of its outer taps and their weight; that of the middle tap is 1.
     factors: Vec<(usize, T)>,

@@ -25,12 +25,9 @@ const REWEIGHTING_ROUNDS: usize = 4;
 /// Share from which on the flow counts as steady; below one minus it, as not steady at all.
 const STEADY_SHARE: f64 = 0.9;
 
-/// Moves the `motion` of a triple to the pixels of the middle frame; `regularized` is the motion before
-/// refinement. The result is the mean of both steps (`central`) or the step to the next frame, also under
-/// acceleration. Returns the statistics by which the windows of the difference were chosen.
-///
-/// Frames warped by equal and opposite motions meet between the earlier and the later position, which is the
-/// position in the middle frame only without acceleration.
+/// Moves the `motion` of a triple (`regularized` before refinement) to the pixels of the middle frame: to the
+/// mean of both steps (`central`) or the step to the next frame. Returns the statistics of its windows.
+/// Frames warped by equal and opposite motions do not meet at the middle frame (see [`steady::next_step`]).
 pub(super) fn to_middle_frame<T: SimdReal>(
     plan: &DescentPlan,
     workspace: &mut Workspace<T>,
@@ -72,8 +69,7 @@ pub(super) fn to_middle_frame<T: SimdReal>(
             space.keep(planes);
         }
         statistics = chosen;
-        // Beside a moving object three frames have twice the occlusions of two; and objects that stop, start
-        // or turn back do not continue their motion.
+        // Three frames have twice the occlusions of two, and objects may stop, start or turn back.
         workspace.release_to_system_if_large();
         let (own, chosen) = refine(simd, space, &RefineOptions::default(), &next_step_motion, &data);
         chosen.into_iter().flat_map(WindowStatistics::into_planes).for_each(|planes| space.keep(planes));
@@ -122,7 +118,6 @@ fn acceleration<T: SimdReal>(space: &PlanePool<T>, motion: &Planes<T>, change: &
     Some(acceleration)
 }
 
-/// Adds `factor` times the first planes of `more`.
 fn add<T: SimdReal>(to: &mut Planes<T>, more: &Planes<T>, factor: f64) {
     let factor = T::from_f64(factor);
     for (y, k) in (0..to.height).flat_map(|y| (0..MOTION).map(move |k| (y, k))) {
@@ -130,8 +125,7 @@ fn add<T: SimdReal>(to: &mut Planes<T>, more: &Planes<T>, factor: f64) {
     }
 }
 
-/// Minimum usable share of a window: below it, at the frame's edge or beside a hole, both estimates are
-/// extrapolated, and so is their difference.
+/// Minimum usable share of a window; below it both estimates, and so their difference, are extrapolated.
 const MIN_WINDOW_SHARE: f64 = 0.95;
 
 /// Gives sites with incomplete windows the flow of the nearest complete ones in their row and column,
@@ -161,7 +155,6 @@ fn continue_beyond<T: SimdReal>(data: &Planes<T>, flow: &mut Planes<T>) {
     }
 }
 
-/// The nearest of some ascending numbers.
 fn nearest(numbers: &[usize], to: usize) -> usize {
     let after = numbers.partition_point(|&n| n < to).min(numbers.len() - 1);
     let (before, after) = (numbers[after.saturating_sub(1)], numbers[after]);

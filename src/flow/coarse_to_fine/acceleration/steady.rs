@@ -145,7 +145,6 @@ fn derive<T: SimdReal>(flow: &mut Planes<T>) {
     }
 }
 
-/// Slope over so many sites.
 fn slope<T: SimdReal>(from: T, to: T, sites: usize) -> T {
     T::from_f64((to.to_f64() - from.to_f64()) / (SITE_SPACING * sites.max(1) as f64))
 }

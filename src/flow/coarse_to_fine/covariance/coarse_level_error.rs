@@ -1,11 +1,9 @@
 //! Coarse-level error: finer levels correct coarser ones only where data constrain the motion.
 //!
-//! A coarse level reaches further into an area without texture than a fine one, and is less exact. Its errors
-//! are measured at sites with texture, where the refined motion is better known: mean squares of the
-//! differences are the variances of the motion handed down from that level. They are taken from mean absolute
-//! values, as for Gaussian errors, so that a few nodes at motion boundaries do not dominate.
-//!
-//! Refinement windows carry such errors out of those areas; where errors grow, slopes err by the rise.
+//! A coarse level reaches further into an area without texture than a fine one, and is less exact. Its
+//! variances are mean squares of the differences from the refined motion at sites with texture, taken from
+//! mean absolute values, as for Gaussian errors, so that motion boundaries do not dominate. Refinement
+//! windows carry such errors out of those areas; where errors grow, slopes err by the rise.
 
 use super::binomial_mean;
 use super::constrained_directions::ConstrainedDirections;
@@ -20,7 +18,6 @@ const LEVEL_REACH: f64 = 4.0;
 /// Variance of the slopes over the mean square rise of the flow's standard deviation.
 const RISE_SHARE: f64 = 0.35;
 
-/// Coarse-level error of a node.
 pub(super) struct CoarseLevelError {
     /// Variances of the flow, px^2, and of the slopes, in the unconstrained directions.
     pub variances: [f64; 2],
@@ -28,7 +25,6 @@ pub(super) struct CoarseLevelError {
     pub directions: [f64; 3],
 }
 
-/// Variances of the motion of coarser levels.
 pub(super) struct CoarseLevelErrors {
     /// Of the flow, px^2 of the finest estimated level, and of the slopes; the next coarser level first.
     variances: Vec<[f64; 2]>,
@@ -36,7 +32,6 @@ pub(super) struct CoarseLevelErrors {
 }
 
 impl CoarseLevelErrors {
-    /// From the refined `motion`, that on `coarser` levels, the finest first, and the constrained directions.
     pub fn new<T: SimdReal>(motion: &Planes<T>, coarser: &[Planes<T>], constrained: ConstrainedDirections) -> Self {
         let mut variances: Vec<[f64; 2]> = Vec::new();
         for (k, coarse) in coarser.iter().enumerate() {
@@ -50,7 +45,6 @@ impl CoarseLevelErrors {
         Self { variances, constrained }
     }
 
-    /// Coarse-level errors of all nodes, row by row.
     pub fn at_nodes(&self, size: (usize, usize)) -> Vec<CoarseLevelError> {
         let distances = (0..size.0 * size.1).map(|n| self.constrained.distance(n % size.0, n / size.0));
         let own: Vec<[f64; 2]> =
@@ -68,8 +62,7 @@ impl CoarseLevelErrors {
         (0..own.len()).map(with_rise).collect()
     }
 
-    /// Directions of the error: the unconstrained ones of the node, or where all are constrained those of its
-    /// neighbours, whose standard deviations are `own`.
+    /// Unconstrained directions of the node, or of its neighbours, whose standard deviations are `own`.
     fn directions(&self, own: &[[f64; 2]], size: (usize, usize)) -> Vec<[f64; 3]> {
         let mut around: Vec<[f64; 4]> = (0..own.len())
             .map(|n| {
@@ -87,9 +80,8 @@ impl CoarseLevelErrors {
         (0..own.len()).map(mean).collect()
     }
 
-    /// Variance of the flow (`kind` 0) or the slopes (1) at a distance, px, from constraining data: a level's
-    /// whole variance from where the next finer one has no data, linear between levels, 0 below half the
-    /// reach of the finest.
+    /// Variance of the flow (`kind` 0) or slopes (1) at a distance, px, from constraining data: a level's own
+    /// where the next finer one has no data, linear between, 0 below half the finest level's reach.
     fn variance(&self, kind: usize, distance: f64) -> f64 {
         if distance.is_infinite() {
             return self.unverified(kind);
@@ -114,8 +106,7 @@ impl CoarseLevelErrors {
     }
 }
 
-/// Mean square differences of flow and slopes from the motion so many levels above, at reference sites on
-/// lines through the nodes; `None` without any.
+/// Mean square differences of flow and slopes from the motion so many levels above, at reference sites.
 fn differences<T: SimdReal>(
     motion: &Planes<T>,
     (coarse, coarser): (&Planes<T>, usize),
@@ -157,7 +148,6 @@ mod tests {
     use super::*;
     use crate::flow::coarse_to_fine::covariance::noise::{ALL, NONE, UnconstrainedDirections};
 
-    /// Constrained sites around a square of unconstrained ones; and the number of nodes along a side.
     fn but_for(side: usize, square: std::ops::Range<usize>) -> (ConstrainedDirections, usize) {
         let constrained = |n: usize| !(square.contains(&(n % side)) && square.contains(&(n / side)));
         let sites: Vec<UnconstrainedDirections> =
@@ -166,7 +156,6 @@ mod tests {
         (ConstrainedDirections::with((side, &sites), (nodes, nodes), |_| true), nodes)
     }
 
-    /// Constant flow and slopes on `side x side` sites.
     fn constant(side: usize, flow: f64, slope: f64) -> Planes<f64> {
         let mut motion = Planes::new(side, side, MOTION);
         for (k, y) in (0..MOTION).flat_map(|k| (0..side).map(move |y| (k, y))) {

@@ -12,15 +12,12 @@ use std::f64::consts::SQRT_2;
 const MIN_CONSTRAINED_SHARE: f64 = 0.02;
 /// Reach, sites, of the mean of the information.
 const INFORMATION_REACH: usize = 1;
-/// Sites of a parallel task.
 const SITES_PER_TASK: usize = 4096;
 
-/// Where and in which directions data constrain the motion.
 pub(super) struct ConstrainedDirections {
     width: usize,
-    /// Distance of every site from the nearest fully constrained one, px, row by row; 0 where nothing is
-    /// usable, which is treated elsewhere. Infinite where one direction is unconstrained and nearly no site
-    /// is constrained.
+    /// Distance of every site from the nearest fully constrained one, px; 0 where nothing is usable, infinite
+    /// where one direction is unconstrained and nearly no site is constrained.
     distances: Vec<f64>,
     /// Reference sites for the errors of coarser levels, row by row: usable and constrained.
     reference_sites: Vec<bool>,
@@ -29,7 +26,6 @@ pub(super) struct ConstrainedDirections {
 }
 
 impl ConstrainedDirections {
-    /// From the data of the sites and their `noise`, for so many `nodes` along x and y.
     pub fn new<T: SimdReal>(data: &Planes<T>, noise: &Noise<'_, T>, nodes: (usize, usize)) -> Self {
         let (width, height) = (data.width, data.height);
         let around_site =
@@ -48,8 +44,7 @@ impl ConstrainedDirections {
         Self::with((width, &sites), nodes, is_usable)
     }
 
-    /// From the directions of all sites. If nearly none is constrained in both directions there is no
-    /// reference; then only motion along texture of one direction is known to be unconstrained.
+    /// From the directions of all sites; if nearly none is constrained in both, there is no reference.
     pub fn with(
         (width, sites): (usize, &[UnconstrainedDirections]),
         nodes: (usize, usize),
@@ -72,7 +67,6 @@ impl ConstrainedDirections {
         out
     }
 
-    /// Whether a site is a reference for the errors of coarser levels.
     pub fn is_reference(&self, x: usize, y: usize) -> bool {
         self.reference_sites[y * self.width + x]
     }
@@ -96,7 +90,6 @@ impl ConstrainedDirections {
         sum.map(|sum| sum / count.max(1.0))
     }
 
-    /// The sites of a node.
     fn around(&self, x: usize, y: usize) -> impl Iterator<Item = usize> + use<> {
         let (width, height) = (self.width, self.distances.len() / self.width);
         // The last nodes are at the last sites.
@@ -152,7 +145,6 @@ mod tests {
         let constrained = ConstrainedDirections::with((side, &sites), (3, 3), |_| true);
         assert_eq!([0, 1, 2].map(|node| constrained.directions(node)), [[0.0; 3], [0.0; 3], [0.0, 0.0, 1.0]]);
         assert_eq!([0, 1, 2].map(|node| constrained.distance(node, 0)), [0.0, 0.0, 2.0 * SITE_SPACING]);
-        // No site is fully constrained; one direction is known to be unconstrained.
         let half: Vec<UnconstrainedDirections> =
             (0..side * side).map(|n| if n % side < 4 { across } else { ALL }).collect();
         let constrained = ConstrainedDirections::with((side, &half), (3, 3), |_| true);

@@ -26,7 +26,6 @@ const CHOSEN_SIGMA_FACTOR: f64 = 1.25;
 const MIN_CHOSEN_SIGMA: f64 = 3.5;
 /// Isotropic share of the slopes' squared errors: estimates of turbulence have divergence.
 const ISOTROPIC_SHARE: f64 = 0.2;
-/// Nodes of a parallel task.
 const NODES_PER_TASK: usize = 1024;
 /// The motion or its loss at a node.
 type Loss = [f64; MOTION];
@@ -34,13 +33,10 @@ type Loss = [f64; MOTION];
 /// Errors over losses, of the flow and of the slopes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shares {
-    /// Of the loss to the fixed Gaussian.
     pub fixed: [f64; 2],
-    /// Of the loss to the chosen windows.
     pub chosen: [f64; 2],
 }
 
-/// The covariance at the nodes of the statistics.
 pub(super) fn curvature_bias<T: SimdReal>(
     motion: &Planes<T>,
     statistics: &WindowStatistics<T>,
@@ -57,7 +53,6 @@ pub(super) fn curvature_bias<T: SimdReal>(
     products
 }
 
-/// Adds the error of a loss.
 fn add_loss(out: &mut Entries, loss: &Loss, shares: [f64; 2]) {
     let energy = shares[1].powi(2) * loss[2..].iter().map(|slope| slope * slope).sum::<f64>();
     let kept = [1.0, (1.0 - ISOTROPIC_SHARE).sqrt()];
@@ -70,7 +65,6 @@ fn add_loss(out: &mut Entries, loss: &Loss, shares: [f64; 2]) {
     (2..MOTION).for_each(|k| out[upper(k, k)] += ISOTROPIC_SHARE * energy / 4.0);
 }
 
-/// The motion at a node.
 pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, (x, y): (usize, usize)) -> Loss {
     let (x, y) = ((SITES_PER_NODE * x).min(motion.width - 1), (SITES_PER_NODE * y).min(motion.height - 1));
     std::array::from_fn(|k| motion.at(k, x, y).to_f64())
@@ -133,7 +127,6 @@ fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, statistics: &WindowStatistic
     lost
 }
 
-/// Gaussian means of `sigma` nodes.
 fn smoothed(values: &[Loss], (width, height): (usize, usize), sigma: f64) -> Vec<Loss> {
     let (along, across) = (gaussians(sigma, (width, 1), width), gaussians(sigma, (height, 1), height));
     let mean = |from: &[Loss], taps: &Taps, first: usize, step: usize| {

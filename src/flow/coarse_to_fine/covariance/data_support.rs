@@ -1,15 +1,13 @@
 //! Data support: distances of nodes from the edge of the area that all frames show.
 //!
-//! Where motion leads out of a frame there are no data, and the motion is extrapolated from the nearest
-//! usable sites. Windows are truncated at that edge, not at the frame's. Untextured areas are extrapolated in
-//! the same way.
+//! Where motion leads out of a frame or there is no texture, the motion is extrapolated from the nearest
+//! usable sites. Windows are truncated at that edge, not at the frame's.
 
 use crate::flow::coarse_to_fine::data_term::{MIN_USABLE_SHARE, SEEN};
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;
 use crate::simd::SimdReal;
 
-/// Positions of the nodes in the usable area.
 pub(super) struct DataSupport {
     /// Signed distances, px, along x and y, to the outermost usable site; negative at nodes without data.
     distances: Vec<[f64; 2]>,
@@ -27,7 +25,6 @@ pub(super) struct Edge {
 }
 
 impl DataSupport {
-    /// At the `width x height` nodes of the statistics.
     pub fn new<T: SimdReal>(data: &Planes<T>, size: (usize, usize)) -> Self {
         Self::with(data, size, |_, _| true)
     }
@@ -58,12 +55,10 @@ impl DataSupport {
         Self { distances: distances.collect(), along, across, width }
     }
 
-    /// Distances of a node along x and y, px: to the end of its usable run, or, negative, back to one.
     pub fn distances(&self, x: usize, y: usize) -> [f64; 2] {
         self.distances[y * self.width + x]
     }
 
-    /// The nearest edges of the frame, along x and along y.
     pub fn edges(&self, x: usize, y: usize) -> [Edge; 2] {
         [self.along.edge(x, y), self.across.edge(y, x)]
     }
@@ -75,12 +70,9 @@ impl DataSupport {
     }
 }
 
-/// The distances along one axis.
 struct Axis {
-    /// Of every node, line by line.
     distances: Vec<f64>,
     nodes: usize,
-    /// The first and the last usable site of every line of nodes.
     ends: Vec<[usize; 2]>,
     sites: usize,
     /// Whether a line itself has usable sites, and not only a neighbouring one.

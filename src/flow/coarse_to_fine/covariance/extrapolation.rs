@@ -2,8 +2,7 @@
 //!
 //! Over a distance `d` within the usable area, `e_u(d) = u(p + d) - u(p) - M(p) d` and `e_M(d) = M(p + d) -
 //! M(p)` are measured along both axes; their mean squares are the variances of motion extrapolated by `d`.
-//! They are taken from mean absolute values, as for Gaussian errors, so that a few pairs of nodes across a
-//! motion boundary do not dominate.
+//! Mean absolute values give them, as for Gaussian errors, so that motion boundaries do not dominate.
 
 use super::data_support::DataSupport;
 use super::{Entries, curvature_bias};
@@ -30,7 +29,6 @@ fn continued(distance: f64, sigma: f64) -> f64 {
     (-distance).max(0.0) + EDGE_SHIFT * reach * (-2.0 * inner * inner).exp()
 }
 
-/// Variances of extrapolated motion.
 pub(super) struct Extrapolation {
     /// Of the flow, px^2, and of the slopes, at each of [`STEPS`].
     variances: [[f64; 2]; STEPS.len()],

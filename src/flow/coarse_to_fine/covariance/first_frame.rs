@@ -12,7 +12,6 @@ use crate::simd::SimdReal;
 
 type Square = [[f64; 6]; 6];
 
-/// The covariance at the nodes, taken from half their motion away and transformed.
 pub(super) fn to_first_frame<T: SimdReal>(
     nodes: &[Entries],
     motion: &Planes<T>,

@@ -18,7 +18,6 @@ pub(super) struct NodeAxis {
 }
 
 impl NodeAxis {
-    /// For so many sites.
     pub fn of(sites: usize) -> Self {
         Self { count: node_count(sites), end: (sites - 1) as f64 / SITES_PER_NODE as f64 }
     }
@@ -31,7 +30,6 @@ impl NodeAxis {
         (first, (first + 1).min(self.count - 1), if length > 0.0 { (at - first as f64) / length } else { 0.0 })
     }
 
-    /// Distance from a node to the next.
     fn length(&self, first: usize) -> f64 {
         (self.end - first as f64).clamp(0.0, 1.0)
     }
@@ -65,7 +63,6 @@ impl<T: SimdReal> CovarianceMap<T> {
         Self { planes, along, across, step: NODE_SPACING << level }
     }
 
-    /// Entry `k` at a pixel.
     pub fn at(&self, k: usize, (x, y): (usize, usize)) -> T {
         let node = |at: usize| at as f64 / self.step as f64;
         let ((left, right, across), (above, below, share)) = (self.along.around(node(x)), self.across.around(node(y)));

@@ -41,9 +41,8 @@ pub(super) use noise::Energy;
 use noise::{Noise, RemainingNoise};
 use rayon::prelude::*;
 
-/// Variance of the flow over that of white noise of the density seen between windows: real noise is not white
-/// and strongest where windows do not remove it. For two frames, and for three, whose last linearisation is
-/// about the refined motion.
+/// Variance of the flow over that of white noise of the density seen between windows, for two and for three
+/// frames: real noise is not white, and strongest where windows do not remove it.
 const FLOW_NOISE_FACTOR: [f64; 2] = [1.15, 1.35];
 /// The same for the slopes.
 const SLOPE_NOISE_FACTOR: f64 = 0.42;
@@ -77,11 +76,9 @@ pub(super) struct CovarianceMaps<T> {
     pub systematic: Option<CovarianceMap<T>>,
 }
 
-/// The covariance at every node of the statistics.
-///
-/// `energy`: residual energy of the noise. `is_pair`: carried to the pixels of the first frame, since a
-/// pair's motion is estimated midway. `with_systematic`: also the systematic part, everything that is not
-/// noise and a share of the noise.
+/// Covariance at every node of the statistics; of a pair (`is_pair`) at the pixels of the first frame.
+/// `energy`: residual energy of the noise. `with_systematic`: also the systematic part, everything but noise
+/// and a share of the noise.
 pub(super) fn covariance<T: SimdReal>(
     estimate: &Estimate<T>,
     energy: Energy,
@@ -152,7 +149,6 @@ fn textured_support<T: SimdReal>(noise: &Noise<'_, T>, data: &Planes<T>, size: (
     tells.then(|| DataSupport::textured(data, size, &textured))
 }
 
-/// Adds the noise density times its share in flow and derivatives; `factors` for flow and slopes.
 fn add_noise(node: &mut Entries, noise: &RemainingNoise, [flow, slopes]: [f64; 2]) {
     add_blocks(node, [flow * noise.flow, slopes * noise.slopes[0], slopes * noise.slopes[1]], &noise.density);
 }
@@ -166,7 +162,6 @@ fn add_blocks(node: &mut Entries, factors: [f64; 3], matrix: &[f64; 3]) {
     }
 }
 
-/// Binomial means over 3 x 3 nodes.
 fn binomial_mean<const N: usize>(nodes: &mut [[f64; N]], (width, height): (usize, usize)) {
     let mean = |[a, b, c]: [&[f64; N]; 3]| std::array::from_fn(|k| 0.25 * (a[k] + c[k]) + 0.5 * b[k]);
     let around = |n: usize, count: usize| [n.saturating_sub(1), n, (n + 1).min(count - 1)];
@@ -183,13 +178,11 @@ fn binomial_mean<const N: usize>(nodes: &mut [[f64; N]], (width, height): (usize
     }
 }
 
-/// Adds variances of the flow and of the slopes, in the unconstrained directions.
 fn add_coarse_level_error(node: &mut Entries, error: &CoarseLevelError) {
     let [flow, slopes] = error.variances;
     add_blocks(node, [flow, slopes, slopes], &error.directions);
 }
 
-/// Adds the remaining peak locking.
 fn add_locking(node: &mut Entries, motion: &[f64; 6], locking: &PeakLocking) {
     for c in 0..2 {
         let (sine, slope) = locking.phase(motion[c]);

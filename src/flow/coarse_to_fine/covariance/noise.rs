@@ -9,15 +9,12 @@
 //! where `H = sum c_n G^n` gives `F = sum c_m c_n 2 / (m + n)` and `S = sum c_m c_n (2 / (m + n))^2`.
 //!
 //! Its shape is that of `e P^-1`, `P` the information and `e` the residual energy around a node. Its size is
-//! not: errors of brightness enter two orders of derivatives, texture has its own spectrum, and
-//! regularisation removes the finest part. So the size is measured in the flow: between two accepted windows
-//! the flow changes by noise, over that of white noise of unit density. The geometric mean of this excess
-//! over the frame is well determined, that of a single node is not.
+//! not: texture has its own spectrum, and regularisation removes the finest noise. So the excess of the
+//! flow's change between accepted windows over white noise is averaged (geometric mean over the frame).
 //!
-//! At the frame's edge windows are truncated: flow reflected at its own noisy edge has up to fifteen times
-//! the variance, slopes across it twenty-four times. These factors come from simulated white noise, as
-//! functions of the distance over the window. Where motion leads out of a frame, that edge is extrapolated
-//! with the noisy slopes of the data windows.
+//! Truncated windows at the frame's edge have up to fifteen times the variance, their slopes across it
+//! twenty-four times. The factors come from simulated white noise. Where motion leads out of a frame, that
+//! edge is extrapolated with the noisy slopes of the data windows.
 
 use super::data_support::{DataSupport, Edge};
 use crate::flow::coarse_to_fine::data_term::{SEEN, UU, UV, VV};
@@ -56,12 +53,9 @@ const MIN_CONSTRAINING_INFORMATION: f64 = 0.5;
 /// The same, if motion in the other direction is unconstrained: as strong as smoothness.
 const MIN_INFORMATION_OF_ONE_DIRECTION: f64 = 20.0;
 
-/// Projection `xx, xy, yy` onto the unconstrained directions: zero where data constrain all of the motion,
-/// the unit matrix where they constrain none of it.
+/// Projection `xx, xy, yy` onto the unconstrained directions: zero without any, the unit matrix if all are.
 pub(super) type UnconstrainedDirections = [f32; 3];
-/// All directions are unconstrained.
 pub(super) const ALL: UnconstrainedDirections = [1.0, 0.0, 1.0];
-/// No direction is.
 pub(super) const NONE: UnconstrainedDirections = [0.0; 3];
 
 /// Residual energy of the noise, grey^2.
@@ -74,7 +68,6 @@ pub(in crate::flow::coarse_to_fine) enum Energy {
 }
 
 impl Energy {
-    /// Scales a known energy; residuals need no factor.
     pub fn times(self, factor: f64) -> Self {
         match self {
             Self::Known(energy) => Self::Known(factor * energy),
@@ -110,7 +103,6 @@ fn at_edge(edge: &Edge, sigma: f64) -> [f64; 2] {
     [1.0 + 14.0 * means * (-2.1 * t - 3.6 * t * t).exp(), 1.0 + 22.7 * slopes * (-(t / 0.74).powi(2)).exp()]
 }
 
-/// The noise of one estimate.
 pub(super) struct Noise<'a, T> {
     statistics: &'a WindowStatistics<T>,
     energy: Energy,
@@ -121,7 +113,6 @@ pub(super) struct Noise<'a, T> {
 }
 
 impl<'a, T: SimdReal> Noise<'a, T> {
-    /// For the estimate's last data term.
     pub fn new(
         statistics: &'a WindowStatistics<T>,
         (data, support): (&Planes<T>, &'a DataSupport),
@@ -142,7 +133,6 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         Self { excess: self.excess.max(other.excess), ..self }
     }
 
-    /// The residual energy of the noise at a node.
     fn energy(&self, x: usize, y: usize) -> f64 {
         match self.energy {
             Energy::Known(energy) => energy,
@@ -150,7 +140,6 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         }
     }
 
-    /// Whether there is texture within [`TEXTURE_REACH`] sites of a node.
     pub fn is_textured(&self, data: &Planes<T>, x: usize, y: usize) -> bool {
         let around = |node: usize, len: usize| {
             let middle = (SITES_PER_NODE * node).min(len - 1);
@@ -163,8 +152,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         self.excess * energy * best <= MAX_TEXTURED_DENSITY
     }
 
-    /// Directions in which the data of sites near a node, with this mean information, do not constrain the
-    /// motion, so that the first iterations do not correct it.
+    /// Directions in which this mean information of the sites near a node does not constrain the motion.
     pub fn unconstrained(&self, [a, b, c]: [f64; 3], x: usize, y: usize) -> UnconstrainedDirections {
         let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
         let radius = half.hypot(b);
@@ -180,7 +168,6 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         [0.5 * (1.0 - cosine), -0.5 * sine, 0.5 * (1.0 + cosine)].map(|entry| entry as f32)
     }
 
-    /// The remaining noise at a node.
     pub fn at(&self, x: usize, y: usize) -> RemainingNoise {
         let energy = self.energy(x, y);
         let inverse = inverse_without_noise(
@@ -206,8 +193,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
     }
 }
 
-/// Inverse of the information without the contribution of noise in every direction: noise has gradients of
-/// its own, and where there is nothing else, nothing is known. A share of [`MIN_INFORMATION_SHARE`] is kept.
+/// Inverse of the information without that of noise, whose gradients carry none about the motion.
 fn inverse_without_noise([a, b, c]: [f64; 3], noise: f64) -> [f64; 3] {
     let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
     let radius = half.hypot(b);
@@ -227,7 +213,6 @@ pub(super) fn mean_information<T: SimdReal>(data: &Planes<T>, columns: Range<usi
     })
 }
 
-/// Information made positive definite.
 fn positive_definite([a, b, c]: [f64; 3]) -> [f64; 3] {
     let floor = 1e-6 + 1e-4 * (a + c);
     [a + floor, b, c + floor]

@@ -21,9 +21,7 @@ pub(super) struct Task<'a, T> {
     pub motion: &'a Planes<T>,
     /// Filters of the window.
     pub taps: &'a [[T; 3]],
-    /// As in [`Weights`].
     pub gradient: T,
-    /// As in [`Weights`].
     pub inverse: T,
     /// Samples from a plane of an output row to the next.
     pub stride: usize,
@@ -56,7 +54,6 @@ impl<T: SimdReal> Kernel<T> for Band<'_, T> {
 }
 
 impl<T: SimdReal> Band<'_, T> {
-    /// All rows of a tile.
     #[inline(always)]
     fn tile<V: Lanes<Scalar = T>>(&mut self, columns: &Columns) {
         let radius = self.task.taps.len() - 1;
@@ -112,7 +109,6 @@ impl<T: SimdReal> Band<'_, T> {
         warp_row::<T, V>(self.task.views, place, columns, self.scratch.frame.all(), image);
     }
 
-    /// The moments of a row of sites.
     #[inline(always)]
     fn site_row<V: Lanes<Scalar = T>>(&mut self, columns: &Columns, site: usize, len: usize) {
         let taps = self.task.taps;

@@ -14,8 +14,7 @@
 //! (21) of WO2010/098160, transported to the site. The terms by which a deforming motion changes the gradient
 //! are already in the warped views. Warping towards the middle of the views follows B. D. Lucas and T.
 //! Kanade, "An iterative image registration technique with an application to stereo vision", 1981. The right
-//! side holds the whole motion and not only its increment, so that iterations do not undo the smoothing by
-//! the window.
+//! side holds the whole motion, so that iterations do not undo the smoothing by the window.
 //!
 //! `band` runs rows of sites through `dense` (motion at every pixel), `warp` (views along it), `products`
 //! (a pixel's equations) and `moments` (their windowed sums); `scratch` holds the rows.
@@ -97,7 +96,6 @@ impl<'a, T: SimdReal> View<'a, T> {
     }
 }
 
-/// Weights and window of the equations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DataOptions {
     /// Weight `g` of the rows 2 and 3 against row 1, px.
@@ -114,11 +112,9 @@ impl Default for DataOptions {
     }
 }
 
-/// Working memory of the threads.
 #[derive(Debug, Default)]
 pub(super) struct Pool<T>(Mutex<Vec<Scratch<T>>>);
 
-/// Computes data terms.
 #[derive(Debug)]
 pub(super) struct DataTerm<'a, T> {
     level: Level,
@@ -132,12 +128,9 @@ impl<'a, T: SimdReal> DataTerm<'a, T> {
         Self { level, options, taps: taps(options.sigma), pool }
     }
 
-    /// Writes the [`COUNT`] planes of moments of a level to `out`; returns `|R|` of a subsample.
-    ///
-    /// `motion` holds the [`MOTION`] planes on the sites, finite, in px of this level per frame. `scale` is
-    /// the standard deviation of `R` where brightness is constant; without it every usable pixel has the
-    /// weight 1. Views and masks have `size`. Runs in the caller's thread pool; the result does not depend on
-    /// the number of threads.
+    /// Writes the [`COUNT`] planes of moments of a level to `out`; returns `|R|` of a subsample. `motion`:
+    /// finite, px of this level per frame. `scale`: standard deviation of `R` at constant brightness; without
+    /// it all weights are 1. Bit-identical for any number of threads, in the caller's thread pool.
     pub fn linearise(
         &self,
         size: (usize, usize),

@@ -19,7 +19,6 @@ use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::simd::{Lanes, SimdReal};
 
-/// Number of planes.
 pub(in super::super) const COUNT: usize = 26;
 /// First plane of the right sides, after moments (1, x, y, x^2, xy, y^2) of `P_uu`, `P_uv`, `P_vv`.
 const RIGHT: usize = 18;
@@ -40,17 +39,14 @@ pub(in super::super) const fn right(i: usize) -> usize {
     RIGHT + 3 * (i % 2) + i / 2
 }
 
-/// Plane of the window's mean of `P_uu`, grey^2/px^2.
+/// Planes of the window's means of `P_uu`, `P_uv` and `P_vv`, grey^2/px^2.
 pub(in super::super) const UU: usize = 0;
-/// That of `P_uv`.
 pub(in super::super) const UV: usize = 1;
-/// That of `P_vv`.
 pub(in super::super) const VV: usize = 2;
-/// That of the residual energy, grey^2.
+/// Plane of the residual energy, grey^2.
 pub(in super::super) const ENERGY: usize = 3;
 /// Share of the window that is usable.
 pub(in super::super) const SEEN: usize = 4;
-/// Number of planes of the summary.
 pub(in super::super) const SUMMARY: usize = 5;
 
 /// Summary of a data term for later stages: all its planes would be most of an estimate's memory.
@@ -181,7 +177,6 @@ fn cut<V: Lanes, const U: usize>(source: &[V::Scalar], start: usize) -> &[V::Sca
     &source[start..start + U * V::LANES]
 }
 
-/// Adds the samples at one distance on both sides.
 #[inline(always)]
 fn add_pair<V: Lanes, const N: usize, const U: usize>(
     before: &[V::Scalar],

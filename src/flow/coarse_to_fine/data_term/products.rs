@@ -5,8 +5,7 @@ use crate::simd::{Lanes, SimdReal};
 
 /// Cubic B-spline stencils down the columns: value b = [1, 4, 1]/6, slope d = [-1, 0, 1]/2, curvature s = [1,
 /// -2, 1] of `A`, value and slope of `R`.
-///
-/// `rows` are the image rows above, at and below; `out` a row of the five planes.
+/// `rows`: the image rows above, at and below; `out`: a row of the five planes.
 #[inline(always)]
 pub(super) fn vertical_stencils<V: Lanes>(columns: &Columns, rows: [&[V::Scalar]; 3], out: &mut [V::Scalar]) {
     let n = columns.count;
@@ -43,7 +42,6 @@ fn along<V: Lanes>([left, here, right]: [V; 3]) -> [V; 3] {
     [curve.mul_add(V::constant(1.0 / 6.0), here), V::constant(0.5) * (right - left), curve]
 }
 
-/// Weights of the equations.
 #[derive(Clone, Copy)]
 pub(super) struct Weights<V> {
     /// Square of the gradient rows' weight.
@@ -52,7 +50,6 @@ pub(super) struct Weights<V> {
     pub inverse: V,
 }
 
-/// The seven products of a row from its stencils and its image row.
 #[inline(always)]
 pub(super) fn products_row<T: SimdReal, V: Lanes<Scalar = T>>(
     columns: &Columns,
@@ -92,7 +89,6 @@ pub(super) fn products_row<T: SimdReal, V: Lanes<Scalar = T>>(
     }
 }
 
-/// The samples of every plane's halves.
 #[inline(always)]
 fn places<'a, T>(columns: &Columns, row: &'a mut [T]) -> [[&'a mut [T]; 2]; PRODUCTS] {
     let mut rest = row;
@@ -105,8 +101,7 @@ fn places<'a, T>(columns: &Columns, row: &'a mut [T]) -> [[&'a mut [T]; 2]; PROD
     })
 }
 
-/// `P_uu, P_uv, P_vv, q_u, q_v, e` and validity of some pixels from the vertical stencils at their left, at
-/// them and at their right.
+/// `P_uu, P_uv, P_vv, q_u, q_v, e` and validity of some pixels, from the stencils left, here and right.
 #[inline(always)]
 fn products<V: Lanes>(near: [[V; 3]; 5], [u, v, valid]: [V; 3], weights: Weights<V>) -> [V; PRODUCTS] {
     let [_, ax, axx] = along(near[0]);

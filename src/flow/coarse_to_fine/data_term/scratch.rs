@@ -10,19 +10,16 @@ use crate::simd::SimdReal;
 pub(super) const LEFT: usize = 16;
 /// Window filters write this many sites at a time.
 pub(super) const CHUNK: usize = 32;
-/// Rows of images and motion that are kept.
 pub(super) const RING: usize = 3;
 
-/// The columns of a tile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Columns {
     /// Site column of sample 0 of a half.
     pub first: usize,
     /// Samples to compute in a half, a multiple of the lanes.
     pub count: usize,
-    /// First site column to write.
+    /// First site column to write, and the end of those columns.
     pub from: usize,
-    /// End of the site columns to write.
     pub to: usize,
     /// Columns of the level, in pixels.
     pub width: usize,
@@ -87,7 +84,6 @@ pub(super) const PRODUCTS: usize = 7;
 /// Maximum number of planes that the vertical filters make of one.
 pub(super) const VERTICAL: usize = 3;
 
-/// All rows of a band.
 #[derive(Debug, Default)]
 pub(super) struct Scratch<T> {
     columns: Columns,
@@ -96,13 +92,9 @@ pub(super) struct Scratch<T> {
     pub frame: Buffer<T>,
     /// `u, u_x, v, v_x` on the site columns of a pixel row: halves, not rows.
     pub sites: Buffer<T>,
-    /// [`RING`] rows of [`IMAGE`] planes.
     pub images: Buffer<T>,
-    /// A row of [`STENCIL`] planes.
     pub stencil: Buffer<T>,
-    /// `2 radius + 1` rows of [`PRODUCTS`] planes.
     pub products: Buffer<T>,
-    /// A row of [`VERTICAL`] planes.
     pub vertical: Buffer<T>,
 }
 

@@ -8,10 +8,8 @@ use crate::types::Mask;
 /// Maximum number of lanes of a vector.
 const MAX_LANES: usize = 16;
 
-/// Mean and rate of the views in row `y` of a level, and 1 where every view is usable.
-///
-/// `frame` as in the scratch; `image` is a row of the planes `A, R, u, v`, validity, of which `u` and `v` are
-/// given.
+/// Mean and rate of the views in row `y` of a level, and 1 where every view is usable, to a row `image` of
+/// the planes `A, R, u, v`, validity, of which `u` and `v` are given.
 #[inline(always)]
 pub(super) fn warp_row<T: SimdReal, V: Lanes<Scalar = T>>(
     views: &[View<'_, T>],
@@ -50,7 +48,6 @@ pub(super) fn warp_row<T: SimdReal, V: Lanes<Scalar = T>>(
     }
 }
 
-/// The samples of half `h` of the planes of an image row.
 #[inline(always)]
 fn planes<'a, T>(columns: &Columns, h: usize, image: &'a mut [T]) -> [&'a mut [T]; 5] {
     let mut rest = image;

@@ -12,12 +12,10 @@ use crate::simd::{Level, SimdReal};
 /// Minimum ratio of residual energies, the typical energy added to both: smaller differences are chance.
 const MIN_ENERGY_RATIO: f64 = 1.1;
 
-/// Frames and scales by which motions are compared.
 pub(in crate::flow::coarse_to_fine) struct Comparison<'a, T> {
     pub simd: Level,
     /// Level whose sites the motions are on.
     pub level: &'a PyramidLevel<T>,
-    /// Frames that are compared.
     pub compared: ComparedFrames,
     /// Standard deviation of the residual, grey levels.
     pub residual_std: Option<T>,
@@ -26,9 +24,8 @@ pub(in crate::flow::coarse_to_fine) struct Comparison<'a, T> {
 }
 
 impl<T: SimdReal> Comparison<'_, T> {
-    /// Replaces `motion` by `other` where both differ by more than `min_distance`, px of the level, and
-    /// `other` has less residual energy; beside such sites both are blended. Returns whether there are such
-    /// sites.
+    /// Replaces `motion` by `other` where they differ by more than `min_distance`, px of the level, and
+    /// `other` has less residual energy, blended beside such sites. Returns whether there are any.
     pub fn replace_where_better(&self, motion: &mut Planes<T>, other: &Planes<T>, min_distance: f64) -> bool {
         let (known, found) = (self.residual_energies(motion), self.residual_energies(other));
         let mut sorted: Vec<f64> = known.iter().copied().filter(|energy| !energy.is_nan()).collect();

@@ -12,9 +12,8 @@ use std::ops::Range;
 /// ones would remove the own motion of small objects.
 const HALF_WEIGHT_DISTANCE: f64 = 0.35;
 
-/// Refines the `motion` of a level, given its `data` term, as start of the next finer level.
-///
-/// A site moves by the share `1 / (1 + (d / c)^4)` of the distance `d` to its refined motion, `c` = 0.35 px.
+/// Refines the `motion` of a level, given its `data` term: a site moves by the share `1 / (1 + (d / c)^4)` of
+/// the distance `d` to its refined motion, `c` = 0.35 px.
 pub(super) fn refine_intermediate<T: SimdReal>(
     simd: Level,
     space: &PlanePool<T>,
@@ -31,13 +30,11 @@ pub(super) fn refine_intermediate<T: SimdReal>(
         .for_each(|planes| space.keep(planes));
 }
 
-/// Moves `motion` towards `refined`, less where they are farther apart.
 fn blend_towards<T: SimdReal>(simd: Level, motion: &mut Planes<T>, refined: &Planes<T>) {
     let (len, stride) = (motion.row_len(), motion.stride());
     for_each_band(motion.data_mut(), len, |_, rows, out| dispatch(simd, Blend { refined, rows, out, stride }));
 }
 
-/// Some rows of [`blend_towards`].
 struct Blend<'a, T> {
     refined: &'a Planes<T>,
     rows: Range<usize>,

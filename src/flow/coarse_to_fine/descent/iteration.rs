@@ -25,8 +25,7 @@ const BORDER_SITES: (usize, usize) = (2, 4);
 /// The border is this fraction of the sites, within those bounds.
 const BORDER_DIVISOR: usize = 16;
 
-/// Iterations of the unregularised trial and its weak smoothness: each site follows its own data. A small
-/// object before a static ground is held back by the usual smoothness, which the ground needs.
+/// Iterations and weak smoothness of the unregularised trial: the usual smoothness holds back small objects.
 const TRIAL: (usize, Smoothness) =
     (3, Smoothness { flow: 1.0, jacobian: 100.0, break_strain: 0.1, sweeps: 4, reweight_every: 2 });
 /// Minimum distance, px of the level, of the trial's motion from the regularised one.
@@ -36,7 +35,6 @@ const MIN_TRIAL_CHANGE: f64 = 0.25;
 /// Regularised iterations after both motions are combined.
 const JOINT_ITERATIONS: usize = 2;
 
-/// One linearisation and the regularised solution.
 pub(super) struct Iteration<'a, T> {
     pub plan: &'a DescentPlan,
     pub compared: ComparedFrames,
@@ -60,7 +58,6 @@ impl<T: SimdReal> Iteration<'_, T> {
         self.iterate(level, smoothness, motion)
     }
 
-    /// Iterates `count` times.
     fn repeat(
         &mut self,
         count: usize,
@@ -118,7 +115,6 @@ pub(super) fn has_settled<T: SimdReal>(from: &Planes<T>, to: &Planes<T>) -> bool
     moving_inside(from, to) < MIN_OBJECT_SITES
 }
 
-/// Number of sites inside the border that have not converged.
 fn moving_inside<T: SimdReal>(from: &Planes<T>, to: &Planes<T>) -> usize {
     let without_border = |len: usize| {
         let border = (len / BORDER_DIVISOR).clamp(BORDER_SITES.0, BORDER_SITES.1).min(len);

@@ -20,25 +20,20 @@ use intermediate::refine_intermediate;
 use iteration::{Iteration, copy, has_settled};
 use std::ops::RangeInclusive;
 
-/// Settings of all iterations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DescentPlan {
     pub simd: Level,
     pub schedule: Schedule,
-    /// Scaling of the brightness.
     pub brightness: BrightnessScale,
-    /// Finest level to estimate.
     pub finest: usize,
     /// Whether the motion on coarser levels is kept, for the covariance.
     pub keeps_levels: bool,
 }
 
-/// Result on the finest level.
 #[derive(Debug)]
 pub(super) struct DescentResult<T> {
     /// The regularised motion.
     pub motion: Planes<T>,
-    /// Summary of the last data term.
     pub data: Planes<T>,
     /// Standard deviation of the residual, grey levels.
     pub residual_std: Option<T>,
@@ -71,8 +66,7 @@ impl DescentPlan {
     }
 
     /// The step to the next frame alone, from two levels above the finest down. Starts from the `motion` of
-    /// all frames, except where the next frame alone gives a better one on coarser levels: objects may turn
-    /// back.
+    /// all frames, or of the next frame where that is better on coarser levels: objects may turn back.
     pub fn next_step<T: SimdReal>(&self, workspace: &mut Workspace<T>, motion: &Planes<T>) -> DescentResult<T> {
         let coarsest = workspace.pyramid.levels().len() - 1;
         let first = coarsest.min(self.finest + self.schedule.next_frame_iterations.len() - 1);
@@ -85,7 +79,6 @@ impl DescentPlan {
         self.without_levels().descend(workspace, ComparedFrames::Ahead, start, (&schedules, self.finest))
     }
 
-    /// The same plan without keeping coarser levels.
     fn without_levels(&self) -> Self {
         Self { keeps_levels: false, ..*self }
     }

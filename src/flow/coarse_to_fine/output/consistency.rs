@@ -19,9 +19,8 @@ const MAX_ENERGY_RATIO: f64 = 10.0;
 /// large, and a residual explained by a shift of 0.1 px is no contradiction.
 const MAX_EXPLAINED_SHIFT_SQUARE: f64 = 0.01;
 
-/// Residual energy over information, px^2, beyond which the frames are unrelated, however common that is; and
-/// the minimum residual for it, as a share of the standard deviation of the brightness, since noise without
-/// texture is no contradiction.
+/// Residual energy over information, px^2, beyond which frames are unrelated; and the minimum residual for
+/// it, over the standard deviation of the brightness, since noise without texture is no contradiction.
 const UNRELATED: (f64, f64) = (0.5, 0.15);
 
 /// Sites with an outlying residual along the motion: occluded in one frame, changed, or wrongly matched.
@@ -52,12 +51,10 @@ impl Consistency {
         Self { contradicted, rows }
     }
 
-    /// Whether the frames contradict the motion at a site.
     pub fn is_contradicted(&self, x: usize, y: usize) -> bool {
         self.contradicted.get(x, y)
     }
 
-    /// Whether they do at any site of a row.
     pub fn has_contradiction(&self, y: usize) -> bool {
         self.rows[y]
     }

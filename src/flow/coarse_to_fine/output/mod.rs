@@ -1,5 +1,4 @@
-//! Field at the requested sites: motion, covariance, status (`consistency`) and
-//! diagnostics.
+//! Field at the requested sites: motion, covariance, status (`consistency`) and diagnostics.
 
 mod consistency;
 
@@ -26,7 +25,6 @@ fn rows() -> f64 {
     1.0 + 2.0 * DataOptions::default().gradient.powi(2)
 }
 
-/// The covariance of the estimate at every node.
 pub(super) fn covariance_of<T: SimdReal>(
     estimate: &Estimate<T>,
     frames: &[&Frame<T>],
@@ -102,7 +100,6 @@ fn is_observable<T: SimdReal>(estimate: &Estimate<T>) -> bool {
     (0..data.height).any(|y| data.line(UU, y).iter().chain(data.line(VV, y)).any(|v| v.to_f64() > threshold))
 }
 
-/// Sources of the field's values.
 struct Writer<'a, T: Clone> {
     simd: Level,
     /// Distance, px of the frame, between the sites of the data.
@@ -251,7 +248,6 @@ impl<T: SimdReal> Kernel<T> for Rows<'_, '_, T> {
     }
 }
 
-/// Every `step`-th value from `first` on.
 #[inline(always)]
 fn copy<T: Copy>(from: &[T], (first, step): (usize, usize), to: &mut [T]) {
     if step == 1 {

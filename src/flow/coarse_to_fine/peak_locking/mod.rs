@@ -20,9 +20,7 @@ use std::f64::consts::{PI, TAU};
 
 /// Samples along a patch's side; the outermost only serve the stencils.
 const SIDE: usize = 16;
-/// Samples of a patch.
 const SAMPLES: usize = SIDE * SIDE;
-/// Approximate number of patches.
 const PATCHES: f64 = 48.0;
 /// Minimum number of patches for a regression.
 const MIN_PATCHES: usize = 4;
@@ -41,8 +39,7 @@ pub(super) struct PeakLocking {
 }
 
 impl PeakLocking {
-    /// Measures the bias on the finest `level` from its motion. `residual_std`: standard deviation of the
-    /// residual, for the robust weights of the rows.
+    /// Measures the bias on the finest `level`; `residual_std` is for the robust weights of the rows.
     pub fn measure<T: SimdReal>(
         simd: Level,
         (level, compared): (&PyramidLevel<T>, ComparedFrames),
@@ -77,7 +74,6 @@ impl PeakLocking {
         found
     }
 
-    /// Removes the bias from the flow and its derivatives.
     pub fn correct<T: SimdReal>(&self, simd: Level, motion: &mut Planes<T>) {
         if self.amplitude == [0.0; 2] {
             return;
@@ -116,7 +112,6 @@ struct Sums {
     weight: f64,
 }
 
-/// A square of pixels and their flow.
 struct Patch {
     corner: (usize, usize),
     flow: [[f64; SAMPLES]; 2],
@@ -201,7 +196,6 @@ impl Patch {
     }
 }
 
-/// Warped views on a patch.
 struct Warped {
     mean: [f64; SAMPLES],
     rate: [f64; SAMPLES],
@@ -230,7 +224,6 @@ impl Warped {
     }
 }
 
-/// One row of [`PeakLocking::correct`].
 struct Correct<'a, T> {
     locking: &'a PeakLocking,
     row: &'a mut [T],

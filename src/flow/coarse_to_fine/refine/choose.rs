@@ -1,7 +1,5 @@
-//! Weights of the windows at each site: O. V. Lepski's comparison of scales with soft decisions.
-//!
-//! Source: O. V. Lepski, "On a problem of adaptive estimation in Gaussian white noise" (1991): climb to wider
-//! windows while the estimate changes by no more than noise explains.
+//! Weights of the windows at each site: climbs to wider ones while noise explains the change (O. V. Lepski,
+//! "On a problem of adaptive estimation in Gaussian white noise", 1991), with soft decisions.
 
 use super::RefineOptions;
 use super::ladder::{Ladder, MAX_OCTAVE, difference_variance};
@@ -29,7 +27,6 @@ pub(super) enum Use {
     Flow,
     /// The slopes of the plain fits.
     Slopes,
-    /// The edge fits.
     Edges,
 }
 
@@ -46,9 +43,9 @@ impl Use {
     }
 }
 
-/// Order of the planes of a choice: for each [`Use`] the weights of the windows, for each grid the sum of
-/// those on coarser grids, and the mean sigma, px; then the weights of the flow over the windows' regional
-/// misfits, and the noise density.
+/// Order of the planes of a choice: per [`Use`] the weights of the windows, per grid the sum of those on
+/// coarser grids, and the mean sigma, px; then the flow's weights over regional misfits, and the noise
+/// density.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Order {
     pub windows: usize,
@@ -67,7 +64,6 @@ impl Order {
     pub fn misfit(self, l: usize) -> usize {
         Use::ALL.len() * self.each() + l
     }
-    /// Planes of each use.
     fn each(self) -> usize {
         self.windows + MAX_OCTAVE + 1
     }
@@ -86,14 +82,12 @@ pub(super) struct Choice<T> {
 }
 
 impl<T: SimdReal> Choice<T> {
-    /// Whether any site uses the edge fits of window `l`.
     pub fn wants_edges(&self, l: usize) -> bool {
         let (zero, plane) = (T::from_f64(0.0), self.order.weight(Use::Edges, l));
         (0..self.planes.height).any(|y| self.planes.line(plane, y).iter().any(|w| *w > zero))
     }
 }
 
-/// The choice at the sites of the regional `means`.
 pub(super) fn choose<T: SimdReal>(
     simd: Level,
     space: &PlanePool<T>,
@@ -117,20 +111,17 @@ pub(super) fn choose<T: SimdReal>(
     Choice { planes, order }
 }
 
-/// Inputs of the climb from narrow windows to wide ones.
 struct Climb<'a, T> {
     means: &'a Planes<T>,
     options: &'a RefineOptions,
     /// Standard deviations of the windows, px.
     sigmas: Vec<f64>,
-    /// The grids that the windows are computed on.
     octaves: Vec<usize>,
     /// Variance of the step from each window to the next, for noise of unit density.
     noise: Vec<f64>,
     order: Order,
 }
 
-/// Weights along a row.
 struct Weights<'a, T> {
     climb: &'a Climb<'a, T>,
     y: usize,
@@ -181,7 +172,6 @@ impl<T: SimdReal> Climb<'_, T> {
         ratio.max(one).min(V::constant(self.options.max_unrest))
     }
 
-    /// The weights of one use at some sites, for noise of the given density.
     #[inline(always)]
     fn weights<V: Lanes<Scalar = T>>(&self, of: Use, density: V, means: &[T], out: &mut [T]) {
         let (stride, windows) = (self.means.stride(), self.order.windows);

@@ -22,16 +22,13 @@ const MIN_MISFIT: f64 = 1e-4;
 /// Steps of the ladder from the windows of the flow to those of its slopes.
 const SLOPE_STEPS: usize = 2;
 
-/// A window whose edge fits are used at any site.
 pub(super) struct EdgeWindow {
-    /// Index in the ladder.
     pub index: usize,
     /// The narrower windows whose slopes it provides.
     slopes_of: Vec<usize>,
 }
 
-/// The windows whose edge fits are used at any site, for the flow or for slopes. Slopes that would need a
-/// window wider than the widest take that one.
+/// The windows whose edge fits are used at any site; the widest also stands in for wider ones.
 pub(super) fn used_windows<T: SimdReal>(choice: &Choice<T>) -> Vec<EdgeWindow> {
     let windows = choice.order.windows;
     let flow: Vec<bool> = (0..windows).map(|l| choice.wants_edges(l)).collect();
@@ -40,7 +37,6 @@ pub(super) fn used_windows<T: SimdReal>(choice: &Choice<T>) -> Vec<EdgeWindow> {
     all.filter(|window| flow[window.index] || !window.slopes_of.is_empty()).collect()
 }
 
-/// One of the windows around a site.
 struct OffsetWindow<T> {
     /// Samples from the site to the window's centre.
     offset: isize,
@@ -49,7 +45,6 @@ struct OffsetWindow<T> {
     dy: T,
 }
 
-/// Edge fits of one window of the ladder.
 pub(super) struct Edges<'a, T> {
     window: &'a EdgeWindow,
     /// Single fits at the finest sites.
@@ -81,7 +76,6 @@ impl<'a, T: SimdReal> Edges<'a, T> {
 }
 
 impl<T: SimdReal> Lines<T> {
-    /// For grids of so many samples from a plane's row to the next plane's.
     pub fn new(stride: usize) -> Self {
         let line = |n: usize| vec![T::from_f64(0.0); n * stride];
         Self { flow: line(2), slopes: line(2), one: line(2), down: line(1) }
@@ -92,14 +86,12 @@ impl<T: SimdReal> Lines<T> {
 pub(super) struct Site<'a, T> {
     pub x: usize,
     pub y: usize,
-    /// Their own flow.
     pub own: [&'a [T; CHUNK]; 2],
     /// Weight of the slopes of wider windows, 0 to 1.
     pub steps: &'a [T; CHUNK],
 }
 
 impl<T: SimdReal> Edges<'_, T> {
-    /// The weights along row `y`.
     #[inline(always)]
     pub fn widen<V: Lanes<Scalar = T>>(&self, choice: &Choice<T>, y: usize, lines: &mut Lines<T>) {
         let plane = |l: usize| choice.order.weight(Use::Edges, l);
@@ -124,7 +116,6 @@ impl<T: SimdReal> Edges<'_, T> {
         }
     }
 
-    /// Adds weight times fit; the weights are those of the flow and of the slopes.
     #[inline(always)]
     fn add_fits<V: Lanes<Scalar = T>>(&self, site: &Site<'_, T>, [flow, slopes]: [&[T; CHUNK]; 2], sums: &mut [T]) {
         let fits = self.fits;

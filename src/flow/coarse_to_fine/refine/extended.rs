@@ -8,7 +8,6 @@ use std::ops::Range;
 /// Sites on each side of the frame: the maximum reach of a window.
 pub(super) const RIM: usize = LEFT;
 
-/// Extrapolation beyond the edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Continuation {
     /// Reflected at the point on the edge, `2 z(edge) - z(mirrored)`: affine motion stays affine.
@@ -30,13 +29,11 @@ impl<T: SimdReal> Field<T> {
         Self { planes: space.planes(width, height + 2 * RIM, count), width, height }
     }
 
-    /// Takes the field out, leaving an empty one.
     pub fn take(&mut self) -> Option<Self> {
         let planes = std::mem::take(&mut self.planes);
         (planes.room() > 0).then_some(Self { planes, width: self.width, height: self.height })
     }
 
-    /// Returns the memory of fields.
     pub fn keep(space: &PlanePool<T>, fields: impl IntoIterator<Item = Self>) {
         fields.into_iter().for_each(|field| space.keep(field.planes));
     }
@@ -52,22 +49,18 @@ impl<T: SimdReal> Field<T> {
         self.planes.padded()
     }
 
-    /// Samples from a plane's row to the next plane's.
     pub fn stride(&self) -> usize {
         self.planes.stride()
     }
 
-    /// Samples from a row to the next.
     pub fn row_len(&self) -> usize {
         self.planes.row_len()
     }
 
-    /// All samples.
     pub fn data(&self) -> &[T] {
         self.planes.data()
     }
 
-    /// All samples.
     pub fn data_mut(&mut self) -> &mut [T] {
         self.planes.data_mut()
     }
@@ -78,7 +71,6 @@ impl<T: SimdReal> Field<T> {
         (y + RIM as isize) as usize * self.row_len() + k * self.stride()
     }
 
-    /// Plane `k` in row `y`, with the samples beside it.
     #[inline(always)]
     pub fn line(&self, k: usize, y: isize) -> &[T] {
         let start = self.start(k, y);
@@ -91,7 +83,6 @@ impl<T: SimdReal> Field<T> {
         &mut self.data_mut()[RIM * len..(RIM + height) * len]
     }
 
-    /// The value of plane `k` at a site.
     #[cfg(test)]
     pub fn at(&self, k: usize, x: usize, y: usize) -> T {
         self.line(k, y as isize)[LEFT + x]

@@ -17,21 +17,17 @@ use std::ops::Range;
 const MIN_EDGE_SHARE: f64 = 0.2;
 /// Maximum relative misfit, at which only edge fits count: keeps sixth powers in single precision.
 const MAX_MISFIT: f64 = 1e5;
-/// Share of the Laplacian of the flow and of its slopes, sites^2, that the fixed windows of data term and
-/// regularisation smooth away (1 px^2, and less for slopes, which lose more by it at motion boundaries than
-/// they gain elsewhere).
+/// Share of the Laplacian of flow and slopes, sites^2, that the fixed windows of data term and regularisation
+/// smooth away (1 px^2); less for slopes, which would lose more at motion boundaries.
 const SHARPENING: [f64; 2] = [0.25, 0.2];
-/// Planes of the sums over edge fits: the motion.
 const SUMS: usize = 6;
 /// Planes of the result: the motion, the window's sigma, the noise density.
 pub(super) const RESULT: usize = 8;
 
-/// Inputs of the final motion.
 pub(super) struct FinishInputs<'a, T> {
     pub choice: &'a Choice<T>,
     /// The flow on the finest grid.
     pub grid: &'a Field<T>,
-    /// The plain estimate on the finest grid.
     pub plain: &'a Field<T>,
     pub options: &'a RefineOptions,
 }
@@ -43,7 +39,6 @@ struct Gates<T> {
 }
 
 impl<T: SimdReal> FinishInputs<'_, T> {
-    /// Whether edge fits have a weight anywhere.
     pub fn has_edges(&self) -> bool {
         // The relative misfit whose weight is [`MIN_EDGE_SHARE`].
         let threshold = T::from_f64(self.options.edge_misfit * (MIN_EDGE_SHARE / (1.0 - MIN_EDGE_SHARE)).cbrt());
@@ -84,7 +79,6 @@ impl<T: SimdReal> FinishInputs<'_, T> {
     }
 }
 
-/// Edge fits of one window, added along some rows.
 struct Add<'a, T> {
     inputs: &'a FinishInputs<'a, T>,
     edges: &'a Edges<'a, T>,
@@ -112,20 +106,17 @@ impl<T: SimdReal> Kernel<T> for Add<'_, T> {
     }
 }
 
-/// The sums over edge fits, before the first of them is added.
 pub(super) fn no_sums<T: SimdReal>(space: &PlanePool<T>, grid: &Field<T>) -> Planes<T> {
     let mut sums = space.planes(grid.width, grid.height, SUMS);
     sums.data_mut().fill(T::from_f64(0.0));
     sums
 }
 
-/// Adds the edge fits of one window.
 pub(super) fn add<T: SimdReal>(simd: Level, inputs: &FinishInputs<'_, T>, edges: &Edges<'_, T>, sums: &mut Planes<T>) {
     let len = sums.row_len();
     for_each_band(sums.data_mut(), len, |_, rows, sums| dispatch(simd, Add { inputs, edges, rows, sums }));
 }
 
-/// Combines plain fits, edge fits and the base motion.
 struct Finish<'a, T> {
     inputs: &'a FinishInputs<'a, T>,
     sums: Option<&'a Planes<T>>,

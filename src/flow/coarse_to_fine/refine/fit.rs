@@ -39,7 +39,6 @@ pub(super) fn fit_row<V: Lanes>(
     }
 }
 
-/// Single fits of one window at every site of its grid.
 struct Fits<'a, T> {
     from: &'a Field<T>,
     scale: &'a Scale<T>,
@@ -86,7 +85,6 @@ pub(super) fn fits<T: SimdReal>(simd: Level, space: &PlanePool<T>, from: &Field<
     out
 }
 
-/// Every second site of a smoothed grid.
 struct Halve<'a, T> {
     from: &'a Field<T>,
     taps: &'a Taps<T>,
@@ -132,7 +130,6 @@ pub(super) fn smooth_row<V: Lanes>(
     filter::<V, 1>(down, LEFT, 1, from.padded(), taps, [along]);
 }
 
-/// Every `step`-th value.
 #[inline(always)]
 pub(super) fn pick<T: Copy>(from: &[T], step: usize, out: &mut [T]) {
     if step == 2 {
@@ -172,7 +169,6 @@ pub(super) fn finish<T: SimdReal>(flow: &mut Field<T>) {
     }
 }
 
-/// u and v, smoothed repeatedly, at every `step`-th site.
 struct Samples<'a, T> {
     fits: &'a Field<T>,
     again: &'a [Taps<T>; EXTRA_PASSES],

@@ -16,7 +16,6 @@ const HALVING_VARIANCE: f64 = 1.5;
 
 /// Coefficients of `G, G^2, ...`: `4 G - 6 G^2 + 4 G^3 - G^4 = 1 - (1 - G)^4`.
 pub(in crate::flow::coarse_to_fine) const TERMS: [f64; 4] = [4.0, -6.0, 4.0, -1.0];
-/// Passes after the first.
 pub(super) const EXTRA_PASSES: usize = TERMS.len() - 1;
 
 /// Filters `[g, g k / (pitch sum g k^2)]` at distance k: mean and slope of a weighted line.
@@ -72,7 +71,6 @@ fn moment(weights: &[f64], power: i32) -> f64 {
     weights.iter().enumerate().map(|(k, g)| (k as f64).powi(power) * g).sum()
 }
 
-/// One window of the ladder.
 #[derive(Debug, Clone)]
 pub(super) struct Scale<T> {
     /// Standard deviation, px.
@@ -87,11 +85,9 @@ pub(super) struct Scale<T> {
     pub variance: f64,
 }
 
-/// All windows, and the filter between grids.
 #[derive(Debug, Clone)]
 pub(super) struct Ladder<T> {
     pub scales: Vec<Scale<T>>,
-    /// Smoothing before each halving.
     pub halving: Taps<T>,
     /// Distance of the finest sites, px.
     pub pitch: f64,
@@ -116,7 +112,6 @@ impl<T: SimdReal> Ladder<T> {
         Self { scales: scales.collect(), halving: halving.clone(), pitch }
     }
 
-    /// The coarsest grid in use.
     pub fn octaves(&self) -> usize {
         self.scales.iter().map(|s| s.octave).max().unwrap_or(0)
     }

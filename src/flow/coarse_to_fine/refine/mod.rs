@@ -47,11 +47,9 @@ use rayon::prelude::*;
 use regional_means::Fitted;
 pub(super) use window_statistics::{SITES_PER_NODE, WindowStatistics, node_count};
 
-/// Refines the flow of `motion`, given the summary of the last data term.
-///
+/// Refines the flow of `motion`, given the summary of the last data term; both finite and of one size.
 /// Returns eight planes: the motion, the mean sigma, the noise density of the given flow (its variance times
 /// the area over which the noise is independent); and the statistics of the choice, `None` without sites.
-/// Both inputs must have the same size and be finite. Bit-identical for any number of threads.
 pub(super) fn refine<T: SimdReal>(
     simd: Level,
     space: &PlanePool<T>,

@@ -15,9 +15,8 @@ pub(in crate::flow::coarse_to_fine) struct RefineOptions {
     pub kappa: f64,
     /// The same for their slopes, under white noise.
     pub kappa_slopes: f64,
-    /// Maximum factor by which slopes accept more in turbulent flow: noise that is not white (particle
-    /// images) reaches wider windows than its density says, and in turbulence no window is free of bias. 1:
-    /// none.
+    /// Maximum factor by which slopes accept more in turbulent flow, where noise of particle images is not
+    /// white and no window is free of bias; 1: none.
     pub max_unrest: f64,
     /// The same for edge fits, whose change is that of the calm part of the region.
     pub kappa_edge: f64,

@@ -13,7 +13,6 @@ use std::ops::Range;
 
 /// Minimum weight of the narrowest window of a coarse grid, for interpolation to finer grids.
 const MIN_FIRST_WEIGHT: f64 = 1e-3;
-/// Parts of the motion that plain fits provide.
 const PLAIN: [Use; 2] = [Use::Flow, Use::Slopes];
 
 /// The windows of one grid: index in the ladder, window, single fits.
@@ -26,11 +25,9 @@ pub(super) struct Plain<'a, T> {
     pub rungs: Rungs<'a, T>,
     /// Planes of [`FIT`]: the mean fit of coarser grids' windows, and their mean relative misfit.
     pub coarser: Option<&'a Field<T>>,
-    /// The flow on this grid.
     pub grid: &'a Field<T>,
 }
 
-/// Scratch lines.
 struct Scratch<T> {
     down: Vec<T>,
     again: Vec<T>,
@@ -133,7 +130,6 @@ impl<T: SimdReal> Scratch<T> {
         }
     }
 
-    /// Divides the sums by their weights.
     #[inline(always)]
     fn divide<V: Lanes<Scalar = T>>(&self, padded: usize, stride: usize, out: &mut [T]) {
         for x in (0..padded).step_by(V::LANES) {
@@ -178,7 +174,6 @@ impl<T: SimdReal> Kernel<T> for Mix<'_, T> {
     }
 }
 
-/// The plain estimate of a grid, in planes of [`FIT`].
 pub(super) fn mix<T: SimdReal>(simd: Level, space: &PlanePool<T>, plain: &Plain<'_, T>) -> Field<T> {
     let mut out = Field::make(space, plain.grid.width, plain.grid.height, FIT);
     let len = out.row_len();

@@ -45,7 +45,6 @@ impl Layout {
     }
 }
 
-/// Quantities that are averaged.
 enum Item<'a, T> {
     /// A plane of the data term.
     Data(usize),
@@ -65,7 +64,6 @@ struct Features<'a, T> {
 
 /// Fields of every window of a ladder, finest first.
 pub(super) struct Fitted<'a, T> {
-    /// Planes of [`FIT`].
     pub fits: &'a [Field<T>],
     /// The smoothed flow on the window's own grid or, from the finest, at every second site.
     pub samples: Vec<Field<T>>,
@@ -106,7 +104,6 @@ pub(super) fn regional_means<T: SimdReal>(
     out
 }
 
-/// Quantities averaged on the grid `octave`.
 fn collect<'a, T: SimdReal>(
     options: &RefineOptions,
     ladder: &Ladder<T>,
@@ -139,7 +136,6 @@ fn collect<'a, T: SimdReal>(
     Features { items, targets }
 }
 
-/// Values of the items, one plane after the other.
 struct Roots<'a, T> {
     items: &'a [Item<'a, T>],
     data: &'a Planes<T>,

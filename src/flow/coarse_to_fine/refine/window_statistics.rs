@@ -26,12 +26,10 @@ impl<T: SimdReal> WindowStatistics<T> {
         Self { means, choice: choice.planes, order: choice.order, sites, sigmas }
     }
 
-    /// The planes.
     pub fn planes_mut(&mut self) -> [&mut Planes<T>; 2] {
         [&mut self.means, &mut self.choice]
     }
 
-    /// The planes.
     pub fn into_planes(self) -> [Planes<T>; 2] {
         [self.means, self.choice]
     }
@@ -68,7 +66,6 @@ impl<T: SimdReal> WindowStatistics<T> {
     }
 }
 
-/// Number of nodes along so many sites.
 pub(in crate::flow::coarse_to_fine) fn node_count(sites: usize) -> usize {
     (sites - 1).div_ceil(SITES_PER_NODE) + 1
 }

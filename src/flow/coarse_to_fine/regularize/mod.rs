@@ -42,11 +42,9 @@ const MAX_FLOW_CHANGE: f64 = 2.0;
 pub(super) struct Smoothness {
     /// Weight of the flow term, relative to the data over its noise, px^-2.
     pub flow: f64,
-    /// Weight of the Jacobian term.
     pub jacobian: f64,
     /// Strain at which a smoothness weight is one half; positive, infinite for weights that never fall.
     pub break_strain: f64,
-    /// Number of relaxation sweeps.
     pub sweeps: usize,
     /// Smoothness weights are updated at every so many visits; positive.
     pub reweight_every: usize,
@@ -62,21 +60,16 @@ impl Default for Smoothness {
 /// Memory that calls of [`regularize`] share.
 #[derive(Debug, Default)]
 pub(super) struct RegularizeScratch<T> {
-    /// The flow at the start.
     start: Planes<T>,
     energies: Vec<T>,
-    /// The smoothness weights.
     weights: Planes<T>,
     rings: Vec<wavefront::Ring<T>>,
 }
 
-/// Regularises the sites' `motion` (planes `u, v, u_x, v_x, u_y, v_y`) by [`Smoothness::sweeps`] relaxation
-/// sweeps. `s^2` is the median residual energy of the sites with data, at least `floor` (positive), grey^2.
-/// Returns the root-mean-square change of the flow, px.
-///
-/// The flow moves by at most 2 px. Where neither data nor neighbours determine it, the motion stays. The
-/// result is the same for any number of threads; call it inside
-/// [`Threads::install`](crate::parallel::Threads::install).
+/// Regularises the sites' `motion` (planes `u, v, u_x, v_x, u_y, v_y`); returns the root-mean-square change
+/// of the flow, px, at most 2 px at a site. `s^2` is the median residual energy of the sites with data, at
+/// least `floor` (positive), grey^2. Where neither data nor neighbours determine the motion, it stays.
+/// Bit-identical for any number of threads, inside [`Threads::install`](crate::parallel::Threads::install).
 pub(super) fn regularize<T: SimdReal>(
     level: Level,
     data: &Planes<T>,
@@ -136,7 +129,6 @@ fn limit_change<T: SimdReal>(level: Level, motion: &mut Planes<T>, start: &Plane
     (sums.iter().sum::<f64>() / sites as f64).sqrt()
 }
 
-/// One row of [`limit_change`]; returns the sum of the squared changes.
 struct LimitChange<'a, T> {
     now: [&'a mut [T]; 2],
     start: [&'a [T]; 2],

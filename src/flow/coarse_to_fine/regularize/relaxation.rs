@@ -55,7 +55,6 @@ impl<T: SimdReal> PackedRow<T> {
         }
     }
 
-    /// Factorises the sites' matrices with the given smoothness weights.
     #[inline(always)]
     pub fn factorise<V: Lanes<Scalar = T>>(&mut self, problem: &SmoothnessProblem<'_, T>, weights: &[T]) {
         let strengths = Strengths::<V>::new(problem.smoothness);
@@ -83,7 +82,6 @@ fn at<V: Lanes<Scalar = T>, T: SimdReal>(block: &[T], plane: usize) -> V {
     V::load(&block[plane * V::LANES..])
 }
 
-/// Entry (i, j) of their normal matrix.
 #[inline(always)]
 fn entry<V: Lanes<Scalar = T>, T: SimdReal>(block: &[T], i: usize, j: usize) -> V {
     at(block, normal(i, j))
@@ -159,7 +157,6 @@ fn edge_term<V: Lanes<Scalar = T>, T: SimdReal>(
     }
 }
 
-/// Moves each site of a run to the solution of its equations.
 #[inline(always)]
 fn solve_sites<V: Lanes<Scalar = T>, T: SimdReal>(
     (packed, weights): (&PackedRow<T>, &[T]),

@@ -13,7 +13,6 @@ macro_rules! each {
 }
 pub(super) use each;
 
-/// The data and smoothness terms of a level.
 pub(super) struct SmoothnessProblem<'a, T> {
     pub data: &'a Planes<T>,
     /// `s^2`, positive.
@@ -79,14 +78,12 @@ pub(super) fn add_smoothness<V: Lanes>(
     }
 }
 
-/// The neighbouring rows.
 #[derive(Clone, Copy)]
 pub(super) struct NeighbourRows<'a, T> {
     /// `None` above the first row.
     pub above: Option<&'a [T]>,
     /// `None` below the last row.
     pub below: Option<&'a [T]>,
-    /// From a plane's row to the next plane's.
     pub stride: usize,
 }
 

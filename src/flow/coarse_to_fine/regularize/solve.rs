@@ -26,9 +26,8 @@ pub(super) const PLACES: [(usize, usize); ENTRIES] = {
     places
 };
 
-/// Keeps pivots positive: each grows by a share above its rounding error, and by a tiny constant.
-///
-/// The unknowns are increments: both only shorten undetermined steps.
+/// Keeps pivots positive: each grows by a share above its rounding error, and by a tiny constant. As the
+/// unknowns are increments, both only shorten undetermined steps.
 pub(super) struct Guard<V> {
     share: V,
     least: V,
@@ -59,7 +58,6 @@ pub(super) fn factorise<V: Lanes>(m: &mut [V; ENTRIES], guard: &Guard<V>) {
     }
 }
 
-/// Solves the equations whose matrix [`factorise`] has factorised.
 #[inline(always)]
 pub(super) fn solve<V: Lanes>(factors: &[V; ENTRIES], right: [V; 6]) -> [V; 6] {
     let mut x = right;
@@ -77,8 +75,7 @@ pub(super) fn solve<V: Lanes>(factors: &[V; ENTRIES], right: [V; 6]) -> [V; 6] {
     x
 }
 
-/// Turns columns `i` and `i + 1` of the remaining matrix into those of `L`, eliminates them from the columns
-/// behind, and returns the inverses of both pivots.
+/// Eliminates columns `i` and `i + 1`, turning them into those of `L`; returns the inverses of both pivots.
 #[inline(always)]
 fn eliminate<V: Lanes>(m: &mut [V; ENTRIES], i: usize, guard: &Guard<V>) -> [V; 2] {
     let (a, b, c) = (m[lower(i, i)], m[lower(i + 1, i)], m[lower(i + 1, i + 1)]);

@@ -22,7 +22,6 @@ use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The packed rows of a wavefront, and which rows these are.
 #[derive(Debug, Default)]
 pub(super) struct Ring<T> {
     packed: Vec<PackedRow<T>>,

@@ -35,7 +35,6 @@ pub(in crate::flow::coarse_to_fine) fn at_first_frame<T: SimdReal>(
     out
 }
 
-/// Some rows of [`at_first_frame`].
 struct ToFirstFrame<'a, T> {
     motion: &'a Planes<T>,
     /// Columns of the sites, px.

@@ -1,5 +1,4 @@
-//! Motion between the sites, on the next finer or coarser level, and at other pixels
-//! (`rows`); that of a pair at the pixels of its `first_frame`.
+//! Motion between sites, on the next level, at other pixels (`rows`), and at the `first_frame` of a pair.
 
 pub(super) mod first_frame;
 pub(super) mod rows;
@@ -10,7 +9,6 @@ use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
 use rows::RowReader;
 
-/// Rows of a parallel task.
 const ROWS: usize = 32;
 
 /// Affine motions of the sites around a position, each with half its lever, blended by distance.
@@ -55,7 +53,6 @@ pub(super) fn finer<T: SimdReal>(simd: Level, coarse: &Planes<T>, size: (usize, 
     });
 }
 
-/// Some rows of [`finer`].
 struct Finer<'a, T> {
     coarse: &'a Planes<T>,
     first: usize,

@@ -25,8 +25,7 @@ impl<T: SimdReal> RowReader<T> {
         &self.pixels[k * self.width..(k + 1) * self.width]
     }
 
-    /// Reads row `y` of an affine motion (planes `u, v, u_x, v_x, u_y, v_y`): between sites, parabolas with
-    /// the values of both and the change of their slopes.
+    /// Reads row `y` of an affine motion: parabolas between sites, with values and slopes of both.
     #[inline(always)]
     pub fn read_motion(&mut self, motion: &Planes<T>, y: usize) {
         self.read(motion, y);

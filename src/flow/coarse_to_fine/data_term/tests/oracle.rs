@@ -4,12 +4,10 @@ use crate::flow::coarse_to_fine::data_term::*;
 use crate::parallel::Threads;
 use crate::types::Frame;
 
-/// A level with its views and a motion.
 pub(super) struct Case {
     pub size: (usize, usize),
     pub frames: Vec<Frame<f64>>,
     pub masks: Vec<Option<Mask>>,
-    /// Planes on the sites, row-major.
     pub motion: [Vec<f64>; MOTION],
     pub scale: Option<f64>,
     pub options: DataOptions,
@@ -48,7 +46,6 @@ impl Case {
         }
     }
 
-    /// The code under test.
     pub fn run<T: SimdReal>(&self, level: Level, threads: usize) -> (Planes<T>, Vec<T>) {
         let pool = Pool::default();
         let term = DataTerm::<T>::new(level, self.options, &pool);
@@ -81,7 +78,6 @@ impl Case {
         })
     }
 
-    /// Motion at a pixel.
     fn dense(&self, x: usize, y: usize) -> [f64; 2] {
         let (sw, sh) = (self.size.0.div_ceil(2), self.size.1.div_ceil(2));
         let near = |p: usize, n: usize| {

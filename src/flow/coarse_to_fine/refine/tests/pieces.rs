@@ -26,8 +26,7 @@ fn beyond(z: &dyn Fn(isize, isize) -> f64, x: isize, y: isize) -> f64 {
     }
 }
 
-/// Weighted least squares by a value and two slopes (per px) in a Gaussian window about (x, y), and the
-/// misfit's variance.
+/// Weighted least squares by value and slopes (per px) in a Gaussian window, and the misfit's variance.
 fn least_squares(z: &dyn Fn(isize, isize) -> f64, sigma: f64, x: isize, y: isize) -> [f64; 4] {
     let radius = (3.0 * sigma + 0.5) as isize;
     let (mut sum, mut mean, mut square, mut along, mut across, mut spread) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
@@ -53,7 +52,6 @@ fn finest(motion: &Planes<f64>) -> (Ladder<f64>, Vec<Field<f64>>) {
     (ladder, grids)
 }
 
-/// Means and slopes with the taps of both axes.
 fn filtered(taps: &[[f64; 3]], z: &dyn Fn(isize, isize) -> f64, x: isize, y: isize) -> [f64; 3] {
     let radius = taps.len() as isize - 1;
     let tap = |k: isize| taps[k.unsigned_abs()].map(|t| if k < 0 { -t } else { t });
@@ -90,8 +88,7 @@ fn fits_are_affine_in_their_windows_and_samples_are_repeated_fits() {
                 for (got, want) in got.iter().zip(filtered(&scale.first.taps, &z, x as isize, y as isize)) {
                     assert!((got - want).abs() < 1e-12, "{} {x} {y}", scale.sigma);
                 }
-                // Near a least-squares fit in the same window: slopes differ by the truncation of the
-                // Gaussian.
+                // Near a least-squares fit; slopes differ by the truncation of the Gaussian.
                 let want = least_squares(&z, scale.sigma / SITE_SPACING, x as isize, y as isize);
                 assert!((got[0] - want[0]).abs() < 1e-12);
                 assert!((got[1] - want[1]).abs() < 0.01 && (got[2] - want[2]).abs() < 0.01, "{got:?} {want:?}");

@@ -105,8 +105,7 @@ pub(super) fn energy<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, c: &Smoo
     sum
 }
 
-/// Random texture under a window of a few pixels whose motion is `truth` at each site; no data where `truth`
-/// is `None`.
+/// Random texture under a small window with the motion `truth` at each site; no data where that is `None`.
 pub(super) fn made<T: SimdReal>(
     width: usize,
     height: usize,
