@@ -20,9 +20,9 @@ demo:
 format:
 	cargo fmt --check
 
-# Everything with the binding; without it, what is not the same anyway.
+# Everything with the binding and the published tracker; without them, what is not the same anyway.
 clippy:
-	cargo clippy -q $(CI) --all-targets --features python -- -D warnings
+	cargo clippy -q $(CI) --all-targets --features python,reference -- -D warnings
 	cargo clippy -q $(CI) --lib --bins -- -D warnings
 
 # Rooms on their own.
@@ -34,7 +34,7 @@ rustdoc:
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q $(CI) --no-deps
 
 rust-test:
-	cargo test $(CI) $(CHECKED)
+	cargo test $(CI) $(CHECKED) --features reference
 
 # The page that tells how to add a motion model, followed to the letter in a copy.
 guide:

@@ -196,16 +196,18 @@ pub(crate) fn report_rotation(
     }
 }
 
-/// Points that decide alone make a motion doubtful that nothing worse is said against; and a rotation alone is
-/// not known of few points whose noise is not one: larger noise may hide a translation.
+/// Points that decide alone make a motion doubtful that nothing worse is said against; and that there is
+/// none, or too little of one, is not known of few points which may have outliers.
 pub(crate) fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
+    let unlikely = |shorter: f64| shorter <= 0.0;
     let few = match found.status {
         Status::Ok => robust::has_high_leverage(all, &found),
         Status::RotationOnly => {
             let inliers = found.residuals.iter().zip(&found.inliers).filter(|(_, inlier)| **inlier);
-            kept.doubtful || !robust::one_noise(inliers.map(|(rest, _)| *rest))
+            let one_noise = robust::one_noise(inliers.map(|(rest, _)| *rest));
+            kept.shorter.is_some_and(|shorter| !(unlikely(shorter) && one_noise))
         }
-        Status::LowSnr => kept.doubtful,
+        Status::LowSnr => kept.shorter.is_some_and(|shorter| !unlikely(shorter)),
         _ => false,
     };
     if few { MotionEstimate { status: Status::FewPoints, ..found } } else { found }

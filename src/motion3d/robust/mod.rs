@@ -91,8 +91,9 @@ pub(crate) struct Consensus {
     /// Other motions with about as many inliers, and how much more each costs, in squared units of noise;
     /// the best first.
     pub competing: Vec<CompetingMotion>,
-    /// Whether few points may have outliers that are not believed.
-    pub doubtful: bool,
+    /// Of few points whose outliers are not believed: by how much, in nats, these would shorten the
+    /// description of the residuals.
+    pub shorter: Option<f64>,
     /// Whether so many outliers fit by chance that least squares on all inliers would follow them.
     pub many: bool,
     /// Probability that points are outliers that fit by chance; `None` if unknown.
@@ -101,7 +102,7 @@ pub(crate) struct Consensus {
 
 impl Consensus {
     fn new(motion: Motion, inliers: Vec<u32>) -> Self {
-        Self { motion, inliers, competing: Vec::new(), doubtful: false, many: false, outliers: None }
+        Self { motion, inliers, competing: Vec::new(), shorter: None, many: false, outliers: None }
     }
 }
 
@@ -137,7 +138,7 @@ fn with_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -
     if shorter < SURE {
         scaled.take(noise_std);
         let found = in_noise(whitening, scaled, false, rng)?;
-        return Some(Consensus { doubtful: shorter > 0.0, ..found });
+        return Some(Consensus { shorter: Some(shorter), ..found });
     }
     Some(found)
 }
