@@ -181,10 +181,12 @@ fn in_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, unknown: bool, rng: 
 /// Finds the inliers of the best candidate, and competing motions.
 fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: CounterRng) -> Option<Consensus> {
     let on = &*search_sample(observations, rng);
-    candidates.extend(second(on, candidates.first()?.0, rng.stream(10)));
-    candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+    if keeps("motion3d.second_motion") {
+        candidates.extend(second(on, candidates.first()?.0, rng.stream(10)));
+        candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+    }
     let mut competing = competing_motions(on, &candidates);
-    let mut found = settle(observations, candidates[0].0)?;
+    let mut found = settle(observations, candidates.first()?.0)?;
     let cells = Cells::new(observations);
     let gate = DepthConsistency::new(observations, &cells);
     for _ in 0..if keeps("motion3d.depth_gate") { DEPTH_ROUNDS } else { 0 } {
