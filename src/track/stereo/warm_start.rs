@@ -16,6 +16,8 @@ use nalgebra::Matrix3;
 const D: usize = 3;
 /// Standard deviations of a typical seed, cells along x, y and disparity.
 const SEED_STD: [f64; D] = [2.0, 2.0, 0.7];
+/// Share of unexplained pixels above which the scene counts as a new one.
+const MAX_UNEXPLAINED_SHARE: f64 = 0.5;
 
 /// Uncertainty of a moved component, cells along x, y and disparity: half a voxel.
 const MOTION_STD: [f64; D] = [0.5, 0.5, 0.5];
@@ -41,19 +43,30 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
     out
 }
 
-/// Seeds components with fewer than [`MIN_COMPONENT_PIXELS`] pixels, or spread too thinly, at the largest
-/// blobs of unexplained pixels. Returns which were seeded and the other unexplained voxels.
+/// Seeds components with fewer than [`MIN_COMPONENT_PIXELS`] pixels, or spread so thinly that they explain
+/// none, at the largest blobs of unexplained pixels. Returns which were seeded and the unexplained voxels
+/// outside of such blobs; `None` if most pixels are unexplained: a new scene.
 ///
-/// One seed a blob: several would compete for it and exchange tracks. Explained pixels do not count, because
-/// a seed beside a flat component could take that over.
-pub(super) fn reseed(posterior: &mut Posterior, voxels: &Voxels, points: &Points) -> Result<Seeded> {
+/// One seed a blob: several would compete for it over the next steps and exchange tracks. Explained pixels do
+/// not count, because a seed beside a flat component could take that over.
+///
+/// # Errors
+/// Those of the mixture.
+pub(super) fn reseed(posterior: &mut Posterior, voxels: &Voxels, points: &Points) -> Result<Option<Seeded>> {
     let components = posterior.components();
     let (densities, shares) = posterior.log_densities(points)?;
     let all: f64 = voxels.counts.iter().map(|&count| f64::from(count)).sum();
+    let least = MIN_COMPONENT_PIXELS;
     let explained = explaining(all);
     let unexplained: Vec<usize> = (0..densities.len()).filter(|&n| densities[n] < explained).collect();
-    let (mut blobs, outliers): (Vec<Blob>, Vec<Blob>) =
-        blobs(voxels, &unexplained).into_iter().partition(|blob| blob.pixels >= MIN_COMPONENT_PIXELS);
+    let (mut blobs, outliers): (Vec<Blob>, Vec<Blob>) = blobs(voxels, &unexplained).into_iter().partition(|blob| {
+        blob.pixels >= least && (!crate::ablation::keeps("stereo.thin_blobs") || blob.explains_itself(all, explained))
+    });
+    if crate::ablation::keeps("stereo.another_scene")
+        && unexplained.iter().map(|&n| f64::from(voxels.counts[n])).sum::<f64>() > MAX_UNEXPLAINED_SHARE * all
+    {
+        return Ok(None);
+    }
     let outliers = outliers.into_iter().flat_map(|blob| blob.members).collect();
     // Ties keep the order of the voxels.
     blobs.sort_by(|a, b| b.pixels.total_cmp(&a.pixels));
@@ -67,11 +80,12 @@ pub(super) fn reseed(posterior: &mut Posterior, voxels: &Voxels, points: &Points
         blob.place(posterior, k);
         seeds[k] = true;
     }
-    Ok(Seeded { seeds, outliers })
+    Ok(Some(Seeded { seeds, outliers }))
 }
 
-/// Whether a component has fewer than [`MIN_COMPONENT_PIXELS`] of all pixels, or explains none.
-fn is_left_over(posterior: &Posterior, k: usize, (pixels, all): (f64, f64)) -> bool {
+/// Whether a component has fewer than [`MIN_COMPONENT_PIXELS`] of all pixels, or is spread so thinly that it
+/// explains none.
+pub(super) fn is_left_over(posterior: &Posterior, k: usize, (pixels, all): (f64, f64)) -> bool {
     pixels < MIN_COMPONENT_PIXELS || log_density(pixels / all, &covariance(posterior, k)) < explaining(all)
 }
 
@@ -82,15 +96,18 @@ fn explaining(all: f64) -> f64 {
     log_density(least / all.max(least), &Matrix3::from_diagonal(&SEED_STD.map(|s| s * s).into()))
 }
 
+/// Covariance of a component, cells^2.
 fn covariance(posterior: &Posterior, k: usize) -> Matrix3<f64> {
     Matrix3::from_row_slice(&posterior.scale_inverses[k * D * D..][..D * D]) / posterior.degrees_of_freedom[k]
 }
 
+/// Result of seeding.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Seeded {
     /// Which components were seeded.
     pub seeds: Vec<bool>,
-    /// Unexplained voxels that are too few for an object: wrong matches, excluded from the fit.
+    /// Unexplained voxels that are too few or too thinly spread for an object: wrong matches, excluded from
+    /// the fit.
     pub outliers: Vec<usize>,
 }
 
@@ -132,12 +149,12 @@ pub(super) mod tests {
         let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();
-        assert_eq!(reseed(&mut posterior, &voxels, &points).unwrap().seeds, [false, true]);
+        assert_eq!(reseed(&mut posterior, &voxels, &points).unwrap().unwrap().seeds, [false, true]);
         let mean = &posterior.means[3..];
         assert_eq!(mean, [41.0, 21.0, 20.0]);
         // Its extent: cells 40 to 42 and 20 to 22, each counted five times, one layer.
         let scatter = |i: usize| posterior.scale_inverses[9 + 4 * i] - COVARIANCE_PRIOR - 45.0 / 12.0;
         assert!((scatter(0) - 30.0).abs() < 1e-9 && (scatter(1) - 30.0).abs() < 1e-9 && scatter(2).abs() < 1e-9);
-        assert_eq!(reseed(&mut posterior, &voxels, &points).unwrap().seeds, [false, false]);
+        assert_eq!(reseed(&mut posterior, &voxels, &points).unwrap().unwrap().seeds, [false, false]);
     }
 }

@@ -5,6 +5,7 @@ use super::super::cell_luminance::{CellLuminance, LUMINANCE_LEVELS};
 use super::super::cell_motion::{CellMotion, ObservedStep, cell_motions};
 use super::super::cluster_motion::middle;
 use super::super::cluster_motion::{ClusterMotion, places, voxel_motion};
+use super::super::clusters::Clusters;
 use super::super::grouping::{GroupMotion, Grouping, groups};
 use super::super::lucas_kanade::SmoothedLevels;
 use super::super::measured_motion::NextView;
@@ -12,7 +13,7 @@ use super::super::overlap::Row;
 use super::super::own_pixels::{View, own_middle};
 use super::super::step::Step;
 use super::super::voxels::{EdgePoints, Voxels};
-use super::super::warm_start::moved;
+use super::super::warm_start::{is_left_over, moved};
 use super::StereoTracker;
 use super::cluster::Clustered;
 use super::meeting::arcs;
@@ -107,7 +108,16 @@ impl StereoTracker {
         let least = Recognition::default().least_overlap;
         let newcomer = |k: usize| seeded.get(k).is_some_and(|seeded| *seeded) && overlap(k) <= least;
         let own = |k: usize| motions.get(k).copied().flatten().filter(|_| !newcomer(k));
-        let lost: Vec<bool> = (0..components).map(|k| newcomer(k) || overlap(k) < least).collect();
+        // A component of leftovers may be anywhere: it needs no new track.
+        let left_over = |k: usize| match (&last, &self.posterior, &posterior) {
+            (Some(last), Some(before), Some(now)) if crate::ablation::keeps("stereo.left_over") => {
+                left_over_in(&last.clusters, before, k)
+                    && left_over_in(&clusters, now, k)
+                    && clusters.pixels[k].len() <= 2 * last.clusters.pixels[k].len()
+            }
+            _ => false,
+        };
+        let lost: Vec<bool> = (0..components).map(|k| newcomer(k) || overlap(k) < least && !left_over(k)).collect();
         self.associate_components(&clusters, &lost);
         let shown = View { plain: left, smooth: levels.sharpest() };
         let middles: Vec<[f64; 2]> = (0..components).into_par_iter().map(|k| own_middle(&clusters, k, shown)).collect();
@@ -145,4 +155,10 @@ impl StereoTracker {
         let affine = motion.affine_at(self.graph.node(self.time.checked_sub(1)?, k)?.middle);
         Some(Departure { motion: [affine[0], affine[1], motion.depth], affine: Some(affine) })
     }
+}
+
+/// Whether component `k` of a step explains too few of its pixels to count.
+fn left_over_in(clusters: &Clusters, posterior: &Posterior, k: usize) -> bool {
+    let pixels = clusters.pixels.get(k).map_or(0.0, |pixels| pixels.len() as f64);
+    k < posterior.components() && is_left_over(posterior, k, (pixels, clusters.points.len() as f64))
 }

@@ -54,8 +54,9 @@ impl StereoTracker {
             }
             fit(&Points { weights: Some(&kept), ..weighted }, &carried, Start::Components(start))
         };
-        if let Some(mut start) = start {
-            let Seeded { seeds, outliers } = reseed(&mut start, &voxels, &weighted)?;
+        if let Some(mut start) = start
+            && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted)?
+        {
             let fitted = without(&start, &outliers)?;
             return Ok((Clustered::new(points, voxels, fitted, &weighted)?, seeds));
         }
@@ -66,8 +67,7 @@ impl StereoTracker {
         for seeding in [true, false] {
             let mut start = fitted.posterior.clone();
             let mut changed = split_and_merge(&mut start, &voxels, &weighted)?;
-            if seeding {
-                let Seeded { seeds, outliers } = reseed(&mut start, &voxels, &weighted)?;
+            if seeding && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted)? {
                 changed |= seeds.contains(&true);
                 left_out = outliers;
             }

@@ -34,7 +34,8 @@ impl Arrival {
     pub const UNKNOWN: Self = Self { motion: None, affine: None, residual: None, coasting: false };
 }
 impl StereoTracker {
-    /// Paper mode: a cluster continues the track of its mutual strongest arc, with a sufficient score.
+    /// Paper mode: a cluster continues the track of another if each is the other's strongest arc, with a
+    /// sufficient score.
     pub(super) fn associate_by_arcs(&mut self, clusters: &Clusters, arcs: &[Arc]) {
         let components = clusters.components();
         let before = std::mem::take(&mut self.association.live);
@@ -53,7 +54,7 @@ impl StereoTracker {
             }
         }
         self.association.live = live;
-        let seen = sightings(clusters, |_| ([0.0; 3], [0.0; 2]));
+        let seen = sightings(clusters, |_| ([0.0; 3], [0.0; 3]));
         self.association.associate(self.clock, &seen, 0.0, None);
     }
 
@@ -66,7 +67,8 @@ impl StereoTracker {
         self.association.associate(self.clock, &seen, MIN_COMPONENT_PIXELS, Some(&Recognition::default()));
     }
 
-    /// Adds the clusters to graph and tracks, and assembles the step.
+    /// Adds the clusters to graph and tracks, and assembles the step from how each arrived and its middle,
+    /// px.
     pub(super) fn record(
         &mut self,
         clusters: &Clusters,
@@ -164,7 +166,7 @@ impl StereoTracker {
 }
 
 /// All components that have edge pixels; `place`: position and spread of each, cells.
-fn sightings(clusters: &Clusters, place: impl Fn(usize) -> ([f64; 3], [f64; 2])) -> Vec<Sighting> {
+fn sightings(clusters: &Clusters, place: impl Fn(usize) -> ([f64; 3], [f64; 3])) -> Vec<Sighting> {
     let pixels = clusters.pixels.iter().map(Vec::len).enumerate().filter(|(_, pixels)| *pixels > 0);
     let sighting = |(component, pixels)| {
         let (position, spread) = place(component);
@@ -173,8 +175,9 @@ fn sightings(clusters: &Clusters, place: impl Fn(usize) -> ([f64; 3], [f64; 2]))
     pixels.map(sighting).collect()
 }
 
-/// Medians along x, y and depth, and median absolute deviations along x and y; cells and layers.
-fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 2]) {
+/// Medians of a cluster's pixels along x, y and depth, and their median absolute deviations, cells and
+/// layers.
+fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 3]) {
     let places: Vec<[f64; 3]> =
         clusters.pixels[k].iter().map(|&i| clusters.lattice().cells_of(clusters.points.at(i as usize))).collect();
     let median = |along: &mut dyn Iterator<Item = f64>| median(&mut along.collect::<Vec<_>>()).unwrap_or(f64::NAN);
@@ -183,7 +186,8 @@ fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 2]) {
     (middle, std::array::from_fn(off))
 }
 
-/// Mean of a component along x and y, px, and its median disparity, which layers do not quantise.
+/// Mean of a component along x and y, px, and the median disparity of its pixels, which layers do not
+/// quantise.
 fn mean(clusters: &Clusters, posterior: &Posterior, k: usize) -> [f64; 3] {
     let [x, y, d] = clusters.lattice().pixels_of(std::array::from_fn(|i| posterior.means[3 * k + i]));
     [x, y, clusters.disparity(k).unwrap_or(d)]

@@ -84,6 +84,12 @@ impl Blob {
         })
     }
 
+    /// Whether its density at one standard deviation counts as explained, among `all` pixels; wrong matches
+    /// are spread too thinly.
+    pub fn explains_itself(&self, all: f64, explained: f64) -> bool {
+        log_density(self.pixels / all, &self.covariance()) >= explained
+    }
+
     /// Sets component `k` to the posterior of these pixels alone; without pixels, to the prior at its old
     /// mean.
     pub fn place(&self, posterior: &mut Posterior, k: usize) {
