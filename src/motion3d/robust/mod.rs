@@ -1,18 +1,16 @@
 //! Inliers of one motion among outliers, in this order.
 //!
 //! * `search`: every direction with the best of many rotations, refined to motions with many inliers. `noise`
-//!   estimates unknown noise from these inliers, and whether few points have outliers at all.
+//!   estimates unknown noise from these inliers, whether few points have outliers at all, and (for
+//!   `diagnostics`) whether few of them decide.
 //! * `depth_consistency`: inliers whose depth is that of their neighbours in the same cell;
 //!   `outlier_posterior`: the probability that an inlier is an outlier, which weighs the points.
 //! * `competing_motions`: other motions with about as many inliers, the choice among many outliers, and
 //!   objects that noise hides.
 //! * `two_motions`: whether residuals are those of two motions.
-//!
-//! `diagnostics` calls `leverage`, which tests whether few points decide.
 
 mod competing_motions;
 mod depth_consistency;
-mod leverage;
 mod noise;
 mod outlier_posterior;
 mod search;
@@ -29,8 +27,7 @@ use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use crate::motion3d::solver::starts::at_most;
 use competing_motions::{among_many_outliers, competing_motions, hidden_object, second};
 use depth_consistency::{Cells, DepthConsistency};
-pub(crate) use leverage::has_high_leverage;
-pub(crate) use noise::{CUT_INFORMATION, larger, one_noise};
+pub(crate) use noise::{CUT_INFORMATION, has_high_leverage, larger, one_noise};
 use outlier_posterior::OutlierPosterior;
 pub(crate) use outlier_posterior::weighted_by_posterior;
 use search::{graduated, robust_motions};
