@@ -28,7 +28,7 @@ impl Watch {
     }
 
     /// Fails with [`Error::Interrupted`] once a signal has come.
-    #[allow(clippy::unused_self)] // asked only by who watches: else the flag is that of an earlier run
+    #[allow(clippy::unused_self)] // read only by who watches: else the flag is that of an earlier run
     pub fn check(&self) -> Result<()> {
         if STOP_REQUESTED.load(Ordering::SeqCst) { Err(Error::Interrupted) } else { Ok(()) }
     }

@@ -1,4 +1,4 @@
-//! What the commands with a pipeline have in common: running it, and context how it ended.
+//! What the commands with a pipeline have in common: running it, and the report of how it ended.
 
 use super::arguments::{GridArguments, MessageArguments};
 use super::interrupt::Watch;

@@ -1,6 +1,10 @@
-//! From a frame source to files, one frame at a time: source, preparation, frame memory, estimator or filter,
+//! From a frame source to files, one frame at a time: source, preparation, estimator or filter,
 //! sinks; and, with trackers in their place, to tracks ([`TrackRun`], of colour frames [`ParticleRun`]); and
 //! from pairs of views to tracks of everything that moves ([`StereoRun`]).
+//!
+//! `run` loops over `prefetch` (the reader's thread), `stage` (preparation, estimator or filter) and `sink`
+//! (files); `output` decides where results go, `album` writes pictures, `text_format` numbers. `track`,
+//! `particle` and `stereo` are the loops with trackers.
 //!
 //! The memory a [`Pipeline`] needs does not depend on the length of the sequence: at most [`READ_AHEAD`]
 //! frames wait behind the reader, and a stage keeps the few frames that it needs (figures 1 and 2 of

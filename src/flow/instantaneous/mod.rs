@@ -11,7 +11,7 @@
 //! `blocks`); `detail` adds covariance and diagnostics (`uncertainty`, `propagation`, `lane_noise`,
 //! `condition`). `noise` is the careful path's covariance; `output` puts estimates in their places.
 //!
-//! Equations are formed per px and frame whatever the pixel pitch is, so that the pitch scales results and
+//! Equations are formed per px and frame for any pixel pitch, so that the pitch scales results and
 //! never changes a decision.
 
 mod blocks;

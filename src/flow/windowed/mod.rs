@@ -15,13 +15,13 @@
 //! `options`; `run` (crop, smoothing, strips, results to the field) with `support` (usable pixels) and
 //! `combine` (frames to coefficients and time differences); `tile` (jets, product planes) with `equations`
 //! (of a pixel) and `plan` (places of products and moments); `moments` (windows); `estimate` (and frames
-//! carried along it) with `solve` (normal equations).
-//! The covariance: `noise` (how pixel noise enters the equations), `scores` (its sums over windows) and
-//! `covariance` (noise, bias and curvature together).
+//! carried along it) with `solve` (normal equations). The covariance: `noise` (how pixel noise enters the
+//! equations), `scores` (its sums over windows) and `covariance` (noise, bias and curvature together).
 //!
-//! A weight of a row enters in `equations::products` (every product of the row times the weight), in
-//! `scores::Weigh` (twice, since it weighs the right-hand side) and in `noise::PixelNoise` (`residual` and
-//! `normal`); a new set of rows also needs its name in `options::RowSet`.
+//! A weight of a row enters in `equations::products` (every product of the row), in `scores::Weigh` (once in
+//! `own`, once in `through_second`) and in `noise::PixelNoise` (`residual`, `normal`); rows 2 and 3 share
+//! planes and must weigh alike (`plan`). A set of rows needs its name in `options::RowSet`, planes in `plan`
+//! and its number of rows in `run`.
 //!
 //! # Pixels without data
 //! Samples that are NaN, infinite or masked invalidate every pixel whose jet (or smoothing) reaches them: NaN

@@ -2,8 +2,8 @@
 //!
 //! With `T = G u`, `s = |T|`, `d = f - R w`: `s e = T_y d_x - T_x d_y` is the residual across the epipolar
 //! line and `s m = T . d` the part along it (2). `lanes` has what a search repeats thousands of times (best
-//! rotation, Gauss-Newton sums, depths), several points at once. The sums with given depths in the weights,
-//! or with depths before the camera, an estimate needs a few dozen times: these take single points.
+//! rotation, Gauss-Newton sums, depths), several points at once. Sums that an estimate needs a few dozen
+//! times (given depths in the weights, depths before the camera) take single points.
 
 mod lanes;
 

@@ -1,12 +1,13 @@
-//! Inliers of one motion among outliers, in this order.
+//! Inliers of one motion among outliers.
 //!
 //! * `search`: every direction with the best of many rotations, refined to motions with many inliers. `noise`
 //!   estimates unknown noise from these inliers, whether few points have outliers at all, and (for
 //!   `diagnostics`) whether few of them decide.
-//! * `depth_consistency`: inliers whose depth is that of their neighbours in the same cell;
-//!   `outlier_posterior`: the probability that an inlier is an outlier, which weighs the points.
 //! * `competing_motions`: other motions with about as many inliers, the choice among many outliers, and
 //!   objects that noise hides.
+//! * `depth_consistency`: inliers whose depth is that of their neighbours in the same cell;
+//!   `outlier_posterior`: the probability that an inlier is an outlier, which weighs the points of the
+//!   solution.
 //! * `two_motions`: whether residuals are those of two motions.
 
 mod competing_motions;

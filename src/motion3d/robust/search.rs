@@ -127,7 +127,7 @@ pub(crate) fn robust_motions(own: &Observations, count: usize, rng: CounterRng) 
     apart(search(first, INLIER, SPACING, rng), APART, count).into_par_iter().map(descended).collect()
 }
 
-/// Refines with Tukey's weights, which graduated from `bound` to the inliers'.
+/// Refines with Tukey's weights, whose cut shrinks from `bound` to that of the inliers.
 pub(crate) fn graduated(observations: &Observations, start: Motion, bound: f64) -> Motion {
     let (mut motion, mut cut) = (start, bound);
     while cut > INLIER {

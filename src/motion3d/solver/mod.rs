@@ -1,10 +1,10 @@
 //! Estimates the motion of points that all have the same one, in this order.
 //!
-//! `starts` searches the half sphere of directions and `refine` descends from there. `regression` and
-//! `smoothing` predict inverse depths from those nearby; `efficient` solves the estimating
-//! equation with these in its weights; `likelihood` chooses among minima and solutions. `covariance` and
-//! `profile_likelihood` compute how well the direction is known. `finite_rotation` repeats this with the
-//! rotation taken out of the displacements.
+//! `starts` searches the half sphere of directions and `refine` descends from there; `finite_rotation`
+//! repeats that with the rotation taken out of displacements. `likelihood` chooses among the minima.
+//! `regression` and `smoothing` predict inverse depths from those nearby, and `efficient` solves the
+//! estimating equation with these in its weights. `covariance` and `profile_likelihood` compute how well the
+//! direction is known.
 
 pub(crate) mod covariance;
 pub(crate) mod efficient;

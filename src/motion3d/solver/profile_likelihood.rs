@@ -1,12 +1,12 @@
 //! What a covariance leaves out where the direction is known to a large share of the field only.
 //!
-//! It is that of the information *at the estimate*. Along the direction that is known least, depths, and with
-//! them the information of the points, change: an estimate that is off may seem to know the motion much
-//! better than one that is right. So the confidence interval of that one unknown is looked for where it ends:
-//! where the estimating equation, with weights smoothed *there* and the other unknowns solved for, is off by
-//! as much as chance makes it in one case of twenty (C. Rao's score test, 1948, which needs the truth of the
-//! place only, not an estimate there). The standard deviation that has these ends is reported, with the
-//! curvature of the profile that they show, and with what the other unknowns are known to there.
+//! It is the inverse of the information *at the estimate*. Along the direction that is known least, depths,
+//! and with them the information of the points, change: an estimate that is off may seem to know the motion
+//! much better than one that is right. So the confidence interval of that one unknown is looked for where it
+//! ends: where the estimating equation, with weights smoothed *there* and the other unknowns solved for, is
+//! off by as much as chance makes it in one case of twenty (C. Rao's score test, 1948, which needs the truth
+//! of the place only, not an estimate there). The standard deviation that has these ends is reported, with
+//! the curvature of the profile that they show, and with what the other unknowns are known to there.
 
 use super::covariance::{damping, direction_block, direction_deviation, inverse};
 use crate::motion3d::kernels::{Bilinear, information};

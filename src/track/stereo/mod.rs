@@ -6,7 +6,7 @@
 //! * [`voxels`]: edge pixels with a disparity, counted in voxels of (x, y, d);
 //! * [`cell_luminance`], [`lucas_kanade`]: the left view reduced to cells, and smoothed at four levels;
 //! * [`measured_motion`]: [`cluster_motion`] of the last step's clusters, under the [`exposure`] of this one,
-//!   and its [`depth_change`] (paper mode: [`cell_motion`]);
+//!   and its [`depth_change`] (paper mode: [`cell_motion`], after the clusters);
 //! * [`warm_start`]: the mixture carried to this step, new seeds, split and merge;
 //! * [`clusters`]: voxels and pixels of each component; [`overlap`] with the last step; [`succession`];
 //! * [`association`]: which track each component is, over time gaps of the [`clock`];
