@@ -42,7 +42,10 @@ def test_boxes_hold_the_pixels_of_their_targets(name, seed, share, scale):
     t = round(share * (len(scene) - 1))
     for target, (left, top, width, height) in enumerate(scene.boxes()[t]):
         rows, columns = np.nonzero(changed(scene, t, target))
-        inside = (columns > left - 1) & (columns < left + width + 1) & (rows > top - 1) & (rows < top + height + 1)
+        # Wheels stand out of a turned car's box, in proportion to the scale: by 1 px at the smallest.
+        margin = 5 * scale
+        inside = (columns > left - margin) & (columns < left + width + margin)
+        inside &= (rows > top - margin) & (rows < top + height + margin)
         assert inside.sum() >= 0.94 * len(rows)
 
 
