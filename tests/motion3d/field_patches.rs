@@ -1,11 +1,12 @@
 //! Windows of fields whose flow is known.
 
+use crate::empty_field;
 use crate::math::random::CounterRng;
 use crate::motion3d::{
     Intrinsics, Motion, MotionEstimate, MotionOptions, Placement, Status as MotionStatus, estimate_patch_motion,
     field_patches,
 };
-use jacoflow::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, SamplingGrid, Status};
+use jacoflow::types::{FlowField, Rect, Status};
 use nalgebra::{SMatrix, SVector};
 
 const FOCAL: f64 = 500.0;
@@ -22,18 +23,7 @@ fn camera() -> Intrinsics {
 
 /// A field of 320 x 240 px whose six numbers at each pixel are given, with the standard deviations `NOISE`.
 fn field(stride: usize, length: f64, six: impl Fn(f64, f64) -> [f64; 6]) -> FlowField<f64> {
-    let layout = FieldLayout {
-        frame_size: (320, 240),
-        sites: SamplingGrid::Grid { region: None, stride },
-        model: "affine".into(),
-        parameters: MOTION_NAMES.map(String::from).to_vec(),
-        frame_period: None,
-        pixel_pitch: (1.0, 1.0),
-        frame_index: 0,
-        correlation_length: length,
-    };
-    let mut field = FlowField::<f64>::empty(layout, true).unwrap();
-    field.status.fill(Status::Ok);
+    let mut field = empty_field::<f64>((320, 240), stride, length);
     let n = field.len();
     let covariance = field.covariance.as_mut().unwrap();
     covariance.fill(0.0);

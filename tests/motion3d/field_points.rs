@@ -1,21 +1,11 @@
 //! Points of fields whose flow is known.
 
+use crate::empty_field;
 use crate::motion3d::{FieldOptions, field_points};
-use jacoflow::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, SamplingGrid, Status};
+use jacoflow::types::{FlowField, Rect, Status};
 
 fn field() -> FlowField<f32> {
-    let layout = FieldLayout {
-        frame_size: (60, 40),
-        sites: SamplingGrid::default(),
-        model: "affine".into(),
-        parameters: MOTION_NAMES.map(String::from).to_vec(),
-        frame_period: None,
-        pixel_pitch: (1.0, 1.0),
-        frame_index: 0,
-        correlation_length: 5.0,
-    };
-    let mut field = FlowField::empty(layout, true).unwrap();
-    field.status.fill(Status::Ok);
+    let mut field = empty_field::<f32>((60, 40), 1, 5.0);
     field.motion.fill(0.5);
     // Of u and v alone, which are independent.
     let (size, covariance) = (field.len(), field.covariance.as_mut().unwrap());

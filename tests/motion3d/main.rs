@@ -25,7 +25,9 @@ mod statuses;
 mod time_to_contact;
 
 // The scenes name them by their place in the crate, whose unit tests share them.
+use jacoflow::types::{FieldLayout, FlowField, MOTION_NAMES, SamplingGrid};
 use jacoflow::{math, motion3d};
+use math::Real;
 use math::random::CounterRng;
 use motion3d::{
     AffinePatches, Flow, Intrinsics, Method, Motion, MotionOptions, Noise, Placement, Status, estimate_motion,
@@ -36,6 +38,23 @@ const W: [f64; 3] = [0.02, -0.03, 0.01];
 
 fn oblique() -> Motion {
     Motion::new([0.6, 0.2, 0.75], W)
+}
+
+/// A field of valid sites of a grid, without flow, whose errors go together over `length` px.
+fn empty_field<T: Real>(frame_size: (usize, usize), stride: usize, length: f64) -> FlowField<T> {
+    let layout = FieldLayout {
+        frame_size,
+        sites: SamplingGrid::Grid { region: None, stride },
+        model: "affine".into(),
+        parameters: MOTION_NAMES.map(String::from).to_vec(),
+        frame_period: None,
+        pixel_pitch: (1.0, 1.0),
+        frame_index: 0,
+        correlation_length: length,
+    };
+    let mut field = FlowField::empty(layout, true).unwrap();
+    field.status.fill(jacoflow::types::Status::Ok);
+    field
 }
 
 /// Pixels of a 640 x 480 picture with their exact displacement over one frame, and inverse depths.

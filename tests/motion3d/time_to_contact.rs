@@ -2,23 +2,12 @@
 
 use crate::motion3d::{CommonEffect, Intrinsics, UncertainMotion, contact_map};
 use crate::scenes::{Scene, smooth};
-use crate::{Motion, MotionOptions, Noise, Placement, estimate_motion};
-use jacoflow::types::{FieldLayout, FlowField, MOTION_NAMES, SamplingGrid, Status};
+use crate::{Motion, MotionOptions, Noise, Placement, empty_field, estimate_motion};
+use jacoflow::types::{FlowField, Status};
 
 /// The same depth everywhere, seen by a camera of 100 px, with standard deviations of 0.05 px.
 fn wall(motion: &Motion, nu: f64, camera: &Intrinsics) -> FlowField<f64> {
-    let layout = FieldLayout {
-        frame_size: (64, 48),
-        sites: SamplingGrid::default(),
-        model: "affine".into(),
-        parameters: MOTION_NAMES.map(String::from).to_vec(),
-        frame_period: None,
-        pixel_pitch: (1.0, 1.0),
-        frame_index: 0,
-        correlation_length: 2.0,
-    };
-    let mut field = FlowField::<f64>::empty(layout, true).unwrap();
-    field.status.fill(Status::Ok);
+    let mut field = empty_field::<f64>((64, 48), 1, 2.0);
     field.covariance.as_mut().unwrap().fill(0.0);
     let n = field.width * field.height;
     for site in 0..n {
