@@ -34,6 +34,8 @@ ROUGHNESS = 6.0
 """Standard deviation of the roughness of a cell, grey levels."""
 SOFT_EDGE = 1.4
 """Width over which a layer's border fades, px."""
+RIM = 4.0
+"""Beyond its half width and height an outline fades within so many px, up to five times as long as wide."""
 PALE_DISTANCE = 22.0
 """Distance of a fence's pales, px."""
 GAIN, BIAS = 1.02, 2.0
@@ -144,6 +146,26 @@ class Layer:
         slope = self.floor * np.clip(y / (height / 2.0), 0, None)
         return pose.disparity + pose.scale**2 * (bulge + slope) + 0 * x
 
+    def disparities(self, pose: Pose, height: int) -> tuple[float, float]:
+        """Between which its disparities lie, px."""
+        nearest = self.relief + self.floor * 2 * max(0.0, self.half[1] + RIM) / height
+        return pose.disparity, pose.disparity + pose.scale**2 * nearest
+
+    def part(
+        self, pose: Pose, size: tuple[int, int], lower: float = 0.0, left: tuple[float, float] = (0.0, 0.0)
+    ) -> tuple[slice, slice]:
+        """Rows and columns of a view of `size` (width, height) outside of which nothing of it is, where it is
+        shown so many rows lower and between so many px further left."""
+        if self.outline == "all":
+            return slice(0, size[1]), slice(0, size[0])
+        a, b = (pose.scale * (half + RIM) for half in self.half)
+        ends = [(pose.y + lower - b, pose.y + lower + b), (pose.x - left[1] - a, pose.x - left[0] + a)]
+        bounds = [
+            np.clip([np.floor(first), np.ceil(last) + 1], 0, n).astype(int)
+            for (first, last), n in zip(ends, size[::-1], strict=True)
+        ]
+        return slice(*bounds[0]), slice(*bounds[1])
+
     def texture(self, rng: np.random.Generator, height: int, width: int) -> Array:
         """Its texture, large enough for its outline or for a background that pans."""
         if self.outline == "all":
@@ -192,25 +214,30 @@ class Scene:
 
     def _step(self, t: int, textures: list[Array], rng: np.random.Generator) -> Step:
         width, height = self.size
-        y, x = np.mgrid[:height, :width].astype(float)
+        rows, columns = np.mgrid[:height, :width].astype(float)
         left, right = np.zeros((height, width)), np.zeros((height, width))
         top, top_right = np.full((height, width), -1), np.full((height, width), -1)
         disparity, motion = np.zeros((height, width)), np.zeros((height, width, 3))
         for index, (layer, cover) in enumerate(zip(self.layers, textures, strict=True)):
             now, then = layer.pose(t), layer.pose(t + 1)
+            part = layer.part(now, self.size)
+            x, y = columns[part], rows[part]
             p, q = (x - now.x) / now.scale, (y - now.y) / now.scale
-            left = _paint(left, top, index, layer, cover, p, q)
-            mine, depth = top == index, layer.disparity_at(p, q, now, height)
+            _paint(left[part], top[part], index, layer, cover, p, q)
+            mine, depth = top[part] == index, layer.disparity_at(p, q, now, height)
             moved = layer.disparity_at(p, q, then, height) - depth
-            disparity[mine] = depth[mine]
-            motion[mine] = np.stack(
+            disparity[part][mine] = depth[mine]
+            motion[part][mine] = np.stack(
                 [then.x + then.scale * p - x, then.y + then.scale * q - y, moved], axis=-1
             )[mine]
             # A pixel of the right view shows the point whose x_left - d(x_left) it is.
-            q_right, x_left = (y - self.row_offset - now.y) / now.scale, x + now.disparity
-            for _ in range(8):
-                x_left = x + layer.disparity_at((x_left - now.x) / now.scale, q_right, now, height)
-            right = _paint(right, top_right, index, layer, cover, (x_left - now.x) / now.scale, q_right)
+            part = layer.part(now, self.size, self.row_offset, layer.disparities(now, height))
+            x, y = columns[part], rows[part]
+            q, x_left = (y - self.row_offset - now.y) / now.scale, x + now.disparity
+            # Without a relief, disparity does not depend on where along the row a point is.
+            for _ in range(8 if layer.relief else 1):
+                x_left = x + layer.disparity_at((x_left - now.x) / now.scale, q, now, height)
+            _paint(right[part], top_right[part], index, layer, cover, (x_left - now.x) / now.scale, q)
         visible = _seen_by_both(top, top_right, disparity, self.row_offset)
         label = np.array([layer.label for layer in self.layers])[top]
         views = [_recorded(view, self.noise, rng) for view in (left, GAIN * right + BIAS)]
@@ -219,12 +246,12 @@ class Scene:
 
 def _paint(
     view: Array, top: NDArray[np.int_], index: int, layer: Layer, cover: Array, p: Array, q: Array
-) -> Array:
-    """The view with one more layer; marks in `top` where it is."""
+) -> None:
+    """Lays one more layer over a part of the view, in place; marks in `top` where it is."""
     alpha = np.clip(OUTLINES[layer.outline](p, q, *layer.half) / SOFT_EDGE + 0.5, 0, 1)
     shown = map_coordinates(cover, [q + cover.shape[0] / 2, p + cover.shape[1] / 2], order=1, mode="reflect")
     top[alpha > 0.5] = index
-    return view * (1 - alpha) + shown * alpha
+    view[:] = view * (1 - alpha) + shown * alpha
 
 
 def _seen_by_both(
