@@ -86,14 +86,27 @@ class Figure:
         patch = self._patch(picture.shape, t)
         if patch is None:
             return
-        inside, along, across = self._samples(patch, t)
-        cover = _pixel_means(inside.astype(float))
-        light = (
-            self.levels[t] * cover
-            if self.surface is None
-            else self.levels[t] * _pixel_means(inside * self._brightness(along, across))
-        )
+        if self.surface is None:
+            cover = self._cover(patch, t)
+            light = self.levels[t] * cover
+        else:
+            inside, along, across = self._samples(patch, t)
+            cover = _pixel_means(inside.astype(float))
+            bright = np.zeros(inside.shape)
+            bright[inside] = self._brightness(along[inside], across[inside])
+            light = self.levels[t] * _pixel_means(bright)
         picture[patch] = picture[patch] * (1.0 - cover) + light
+
+    def _cover(self, patch: tuple[slice, slice], t: int) -> Array:
+        """Share of each pixel of the patch that it covers."""
+        if self.shape != "square" or self.angles[t] != 0.0:
+            return _pixel_means(self._samples(patch, t)[0].astype(float))
+        # Upright: the share of the rows times the share of the columns.
+        rows, columns = (
+            (np.abs(_places(span) - centre) <= size / 2).reshape(-1, SAMPLES).mean(axis=1)
+            for span, centre, size in zip(patch, self.centres[t][::-1], self.sizes[t][::-1], strict=True)
+        )
+        return rows[:, None] * columns
 
     def _patch(self, shape: tuple[int, ...], t: int) -> tuple[slice, slice] | None:
         """Rows and columns of the picture that it may touch."""
@@ -110,9 +123,7 @@ class Figure:
     def _samples(self, patch: tuple[slice, slice], t: int) -> tuple[NDArray[np.bool_], Array, Array]:
         """Which samples of the patch lie on it, and where they lie along its width and height, px from its
         centre."""
-        y, x = (
-            np.arange(SAMPLES * s.start, SAMPLES * s.stop) / SAMPLES + (1 / SAMPLES - 1) / 2 for s in patch
-        )
+        y, x = (_places(span) for span in patch)
         dx, dy = x - self.centres[t, 0], y[:, None] - self.centres[t, 1]
         c, s = np.cos(self.angles[t]), np.sin(self.angles[t])
         along, across = c * dx + s * dy, c * dy - s * dx
@@ -128,6 +139,11 @@ class Figure:
         return ndimage.map_coordinates(
             self.surface, [across + middle, along + middle], order=1, mode="nearest"
         )
+
+
+def _places(span: slice) -> Array:
+    """Where the samples of some rows or columns lie, px."""
+    return np.arange(SAMPLES * span.start, SAMPLES * span.stop) / SAMPLES + (1 / SAMPLES - 1) / 2
 
 
 def _pixel_means(samples: Array) -> Array:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,12 @@ class Plane:
     def at(self, t: int) -> Array:
         """Its picture at frame `t`."""
         return self.still if self.motion is None else shifted(self.still, *self.motion[t])
+
+
+@lru_cache(maxsize=1)
+def _grain(seed: int, shape: tuple[int, ...]) -> Array:
+    """Noise of deviation 1, (T, H, W): nearly all scenes have the same."""
+    return np.random.default_rng(seed).standard_normal(shape)
 
 
 @dataclass(frozen=True)
@@ -115,12 +121,11 @@ class Scene:
 
     def frames(self) -> NDArray[np.uint8]:
         """(T, H, W), what the camera sees."""
-        rng = np.random.default_rng(self.noise_seed)
         seen: list[NDArray[np.uint8]] = []
         for t in range(len(self.centres)):
             picture = self.picture(t)
             if self.noise > 0:
-                picture = picture + rng.normal(0.0, self.noise, picture.shape)
+                picture = picture + self.noise * _grain(self.noise_seed, (len(self.centres), *picture.shape))[t]
             frame = np.rint(np.clip(picture, 0.0, 255.0)).astype(np.uint8)
             if t in self.uniform:
                 frame[:] = self.uniform[t]
