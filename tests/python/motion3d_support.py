@@ -1,7 +1,6 @@
 """What the tests of rigid 3-D motion share: the scenes and scores of the benchmarks, and the usual scene."""
 
 
-from benchmarks.rivals import motion3d as rivals
 from benchmarks.scenes import motion3d as scenes
 from benchmarks.tables import motion3d_claims as claims
 from benchmarks.tables import motion3d_coverage as coverage
@@ -12,7 +11,7 @@ from benchmarks.tables import motion3d_published as scores
 from benchmarks.tables import motion3d_six as six
 from jacoflow import motion3d
 
-__all__ = ["U", "W", "claims", "coverage", "fixed", "honesty", "layouts", "rivals", "scenes", "scores", "scene", "six", "start"]
+__all__ = ["U", "W", "claims", "coverage", "fixed", "honesty", "layouts", "scenes", "scores", "scene", "six", "start"]
 
 U, W = scenes.motion("oblique")
 

@@ -1,5 +1,6 @@
 """The published tables of 3-D motion, row by row: how large errors are beside what is published, predicted and reached by others."""
 
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,19 +12,27 @@ from benchmarks.tables import motion3d_published as scores
 from jacoflow import motion3d
 
 
+GAINS = (2, 3, 5, 6, 7, 8)
+"""Rows of the table of scenes in which smoothed weights are worth a quarter of the error and more."""
+
+
 @pytest.mark.parametrize("case", range(len(scores.PRACTICAL)))
 def test_no_scene_pays_for_smoothed_weights(case):
-    """Every row of the table of scenes: both columns within a fifth of the published, and smoothed weights never more than 3 % above maximum likelihood on the same noise."""
+    """Every row of the table of scenes: both columns within a fifth of the published, and smoothed weights never more than 3 % above maximum likelihood on the same noise. Where they are worth their while, 1.3 times below, and honest."""
     depth, name, n, noise_std, h, asked = scores.PRACTICAL[case]
-    plain, smoothed = [], []
-    for seed in range(60 if n == 5000 else 150):
+    plain, smoothed, inside = [], [], []
+    for seed in range(60 if n == 5000 else 300 if case in GAINS else 150):
         make = scenes.differential(depth, name, n, noise_std, seed, h)
         found = motion3d.estimate_motion(make.points, make.flow, noise_std=noise_std, placement="start", method="efficient")
         plain.append(scores.angle(found.ml.translation, make.u))
         smoothed.append(scores.angle(found.translation, make.u))
+        inside.append(scores.holds(make, found, found.covariance))
     assert scores.rms(smoothed) <= 1.03 * scores.rms(plain)
     assert scores.rms(smoothed) == pytest.approx(asked[2], rel=0.2)
     assert scores.rms(plain) == pytest.approx(asked[0], rel=0.2)
+    if case in GAINS:
+        assert scores.rms(plain) > 1.3 * scores.rms(smoothed)
+        assert 0.88 <= np.mean(inside) <= 0.97
 
 
 @pytest.mark.parametrize("case", range(len(scores.TRUE_WEIGHTS)))
@@ -48,16 +57,20 @@ def test_distances_are_those_of_theory(case, monkeypatch):
     assert row["m(CRLB)"] > row["m(17)"], row
 
 
+@cache
+def trial(case, seed):
+    """Of two views in pixels: the scene and its estimate."""
+    depth, name, noise_std, median, disturbed, _ = scores.PIXELS[case]
+    make = scenes.two_views(depth, name, noise_std, median, seed, **disturbed)
+    return make, motion3d.estimate_motion(make.points, make.flow, scenes.K, noise_std=noise_std, robust=bool(disturbed), method="efficient")
+
+
 def errors_in_pixels(case, trials):
     """Errors of maximum likelihood and of smoothed weights, deg, and the published medians and rms of both."""
-    depth, name, noise_std, median, disturbed, asked = scores.PIXELS[case]
-    plain, smoothed = [], []
-    for seed in range(trials):
-        make = scenes.two_views(depth, name, noise_std, median, seed, **disturbed)
-        found = motion3d.estimate_motion(make.points, make.flow, scenes.K, noise_std=noise_std, robust=bool(disturbed), method="efficient")
-        plain.append(scores.angle(found.ml.translation, make.u))
-        smoothed.append(scores.angle(found.translation, make.u))
-    figures = [tuple(float(part) for part in text.split(" / ")) for text in asked[:2]]
+    trials = [trial(case, seed) for seed in range(trials)]
+    plain = [scores.angle(found.ml.translation, make.u) for make, found in trials]
+    smoothed = [scores.angle(found.translation, make.u) for make, found in trials]
+    figures = [tuple(float(part) for part in text.split(" / ")) for text in scores.PIXELS[case][5][:2]]
     return plain, smoothed, figures
 
 
@@ -76,14 +89,34 @@ def test_two_views_in_pixels_are_as_published(case):
                 assert 0.55 * asked < got < 1.2 * asked + 0.005, (name, what, got, asked)
 
 
+@pytest.mark.parametrize("case", range(len(scores.PIXELS)))
+def test_two_views_in_pixels_beat_opencv(case):
+    """On 40 trials never more than 5 % worse than any of OpenCV's, and three times better with 40 % outliers; right labels."""
+    noise_std, disturbed = scores.PIXELS[case][2], scores.PIXELS[case][4]
+    trials = [trial(case, seed) for seed in range(40)]
+    ours = scores.rms([scores.angle(found.translation, make.u) for make, found in trials])
+    if disturbed:
+        right = np.mean([np.mean(found.inliers == make.inliers) for make, found in trials])
+        assert right > (0.985 if case == 9 else 0.99)
+    if rivals.cv2 is None:
+        return
+    for method in rivals.METHODS.values():
+        errors = []
+        for make, _ in trials:
+            _, mean = scenes.exponential(make.w)
+            direction, _ = rivals.two_view(make.points, make.flow, scenes.K, noise_std, method)
+            errors.append(scores.angle(direction, mean @ make.u))
+        theirs = scores.rms(errors)
+        assert ours <= theirs / 3 if disturbed.get("outliers") == 0.4 else ours <= 1.05 * theirs + 0.005, (ours, theirs)
+
+
 def test_maximum_likelihood_over_the_smooth_scene_seen_sideways_is_published_below_its_prediction():
     """Two views, .5 px, 2 px: it is as large as (17) says, at the best of its minima too; the rms that is published lies within what 24 trials in a row differ by."""
     case = 2
     errors, smoothed, figures = errors_in_pixels(case, 240)
-    depth, name, noise_std, median, _, _ = scores.PIXELS[case]
+    noise_std = scores.PIXELS[case][2]
     nearest, predicted = [], []
-    for seed in range(240):
-        make = scenes.two_views(depth, name, noise_std, median, seed)
+    for make, _ in (trial(case, seed) for seed in range(240)):
         nearest.append(scores.angle(motion3d.estimate_motion(make.points, make.flow, scenes.K, noise_std=noise_std, method="ml", initial=(make.u, make.w)).translation, make.u))
         predicted.append(motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, noise_std=noise_std).direction_std[1])
     assert figures[0][1] < 0.85 * scores.rms(predicted)
@@ -92,6 +125,21 @@ def test_maximum_likelihood_over_the_smooth_scene_seen_sideways_is_published_bel
     roots = np.sqrt(np.mean(np.reshape(errors, (-1, scores.BLOCK)) ** 2, 1))
     assert roots.min() < figures[0][1] < roots.max()
     assert scores.rms(errors) > 1.5 * scores.rms(smoothed)
+
+
+def test_ground_seen_obliquely_is_published_below_its_bound():
+    """Two views of the ground, 0.5 px: the published rms of 24 trials lies below the bound; ours comes as near to what true depths in the weights reach as anyone's could."""
+    case = 5
+    assert scores.PIXELS[case][:4] == ("ground", "oblique", 0.5, 2)
+    _, errors, figures = errors_in_pixels(case, 240)
+    ideal, bounds = [], []
+    for make, _ in (trial(case, seed) for seed in range(240)):
+        near = {"initial": (make.u, make.w), "weight_inv_depth": make.depths}
+        found = motion3d.estimate_motion(make.points, make.flow, scenes.K, noise_std=0.5, method="efficient", **near)
+        ideal.append(scores.angle(found.translation, make.u))
+        bounds.append(motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, noise_std=0.5).direction_std[0])
+    assert figures[1][1] < scores.rms(bounds) < scores.rms(errors) < 1.2 * scores.rms(bounds)
+    assert scores.rms(errors) < 1.06 * scores.rms(ideal) and scores.rms(errors) < 1.45 * figures[1][1]
 
 
 def test_rivals_are_there_to_be_beaten():

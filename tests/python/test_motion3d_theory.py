@@ -39,18 +39,6 @@ def test_the_bound_is_that_of_a_plain_computation():
     assert_allclose(bound.direction_std[0], np.degrees(np.sqrt(np.trace(bound.crlb[:2, :2]))))
 
 
-@pytest.mark.parametrize("case", range(6))
-def test_theory_is_met(case, monkeypatch):
-    """ML follows (17) and not the bound: rms and both predictions within a fifth of the published, distances under each."""
-    monkeypatch.setattr(scores, "THEORY", scores.THEORY[case : case + 1])
-    row = scores.theory(200)[0]
-    for name in ("ML rms", "(17)", "CRLB"):
-        assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.2), row
-    for name in ("m(17)", "m(CRLB)"):
-        assert row[name] == pytest.approx(row[f"{name} asked"], rel=0.25), row
-    assert row["m(CRLB)"] > row["m(17)"]
-
-
 def test_section_five_is_met():
     for row in scores.one_unknown(3000):
         for name in ("ML / (29)", "ones / (31)", "shrunk / its formula"):
@@ -58,22 +46,6 @@ def test_section_five_is_met():
                 assert row[name] == pytest.approx(1, abs=0.08), row
             elif name == "ML / (29)":
                 assert 1.1 < row[name] < 1.5, row
-
-
-@pytest.mark.parametrize("case", [2, 3, 5, 6, 7, 8])
-def test_smoothed_weights_are_worth_their_while(case):
-    """1.3 times below maximum likelihood on the same noise, within a fifth of the published figure, and honest."""
-    depth, name, n, noise_std, h, asked = scores.PRACTICAL[case]
-    errors, plain, inside = [], [], []
-    for seed in range(300):
-        make = scenes.differential(depth, name, n, noise_std, seed, h)
-        found = start(make)
-        errors.append(scores.angle(found.translation, make.u))
-        plain.append(scores.angle(found.ml.translation, make.u))
-        inside.append(scores.squared(scores.error(make, found.translation, found.rotation, found.tangent), found.covariance) < 11.070)
-    assert scores.rms(plain) > 1.3 * scores.rms(errors)
-    assert scores.rms(errors) == pytest.approx(asked[2], rel=0.2)
-    assert 0.88 <= np.mean(inside) <= 0.97
 
 
 @pytest.mark.parametrize("case", [7, 8])
@@ -93,21 +65,6 @@ def test_maximum_likelihood_over_noisy_ground(case):
     assert scores.rms(turns) == pytest.approx(asked[7], rel=0.2)
     assert scores.rms(errors) > 1.5 * scores.rms(bounds)
     assert 0.88 <= np.mean(inside) <= 0.98
-
-
-def test_ground_seen_obliquely_is_published_below_its_bound():
-    """Two views of the ground, 0.5 px: the published rms of 24 trials lies below the bound; ours comes as near to what true depths in the weights reach as anyone's could."""
-    case = next(case for case in scores.PIXELS if case[:4] == ("ground", "oblique", 0.5, 2))
-    errors, ideal, bounds = [], [], []
-    for seed in range(240):
-        make = scenes.two_views("ground", "oblique", 0.5, 2, seed)
-        run = lambda make=make, **options: motion3d.estimate_motion(make.points, make.flow, scenes.K, noise_std=0.5, method="efficient", **options)
-        errors.append(scores.angle(run().translation, make.u))
-        ideal.append(scores.angle(run(initial=(make.u, make.w), weight_inv_depth=make.depths).translation, make.u))
-        bounds.append(motion3d.motion_bound(make.points, make.u, make.w, make.depths, scenes.K, noise_std=0.5).direction_std[0])
-    published = float(case[5][1].split(" / ")[1])
-    assert published < scores.rms(bounds) < scores.rms(errors) < 1.2 * scores.rms(bounds)
-    assert scores.rms(errors) < 1.06 * scores.rms(ideal)
 
 
 def test_what_the_text_says_besides_its_tables():
