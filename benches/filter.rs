@@ -38,7 +38,6 @@ macro_rules! measure {
         let options = FlowFilterOptions {
             form: $form,
             transition: $transition,
-            residual: false,
             threads: Threads::new(Some($threads)).expect("a positive number"),
             simd: Some($level),
             ..FlowFilterOptions::patent()

@@ -19,7 +19,7 @@ from benchmarks import report
 SECTIONS: dict[str, tuple[str, ...]] = {
     "flow": ("flow",),
     "memory": ("memory",),
-    "filter": ("filter",),
+    "filter": ("filter", "flow_filter"),
     "controlled": ("controlled",),
     "coverage": ("coverage",),
     "recordings": ("recordings",),

@@ -179,6 +179,9 @@ class FilterProfile:
     """Process noise: variances per frame, shape (12,)."""
     R: float | None = None
     """Measurement noise: variance of one pixel, 8-bit grey levels squared."""
+    adaptive: bool | None = None
+    """Take the noise from the residual of each fit where it exceeds that of `R`, and start the brightness anew
+    where a frame contradicts the prediction; default True. False: the patent's filter for all frames."""
     x0: ArrayLike | None = None
     """Mean before the first frame, shape (12,)."""
     P0: ArrayLike | None = None

@@ -1,10 +1,14 @@
-//! Measurement from brightness: the fitted jet of each site and the residual of the fit.
+//! Measurement from brightness: the fitted jet of each site, and what the fit leaves.
 
 use super::kernel::BLOCK;
-use super::kernel::update::MEASURED;
+use super::kernel::update::{MEASURED, MISFIT, PRESENT, SHARE};
 use crate::jet::JetStencil;
 use crate::simd::{Kernel, Lanes, SimdReal};
 use crate::types::Frame;
+
+/// How far the residual must lie above what white noise of the given variance leaves, in standard deviations,
+/// before it counts as structure that no quadratic describes.
+const MISFIT_THRESHOLD: f64 = 3.0;
 
 /// A neighbourhood's fit in working precision.
 #[derive(Debug, Clone)]
@@ -17,10 +21,13 @@ pub(super) struct Fit<T> {
     design: Vec<[T; 6]>,
     /// Expected sum of squared residuals for unit noise; zero if the fit has no degrees of freedom left.
     freedom: f64,
+    /// Residual variance, grey levels squared, above which the quadratic does not describe the neighbourhood;
+    /// the largest number if the filter does not adapt.
+    threshold: f64,
 }
 
 impl<T: SimdReal> Fit<T> {
-    pub(super) fn new(stencil: &JetStencil, frame_width: usize) -> Self {
+    pub(super) fn new(stencil: &JetStencil, frame_width: usize, noise: Option<f64>) -> Self {
         let (weights, design) = (stencil.weights(), stencil.design());
         let mut freedom = 0.0;
         for (o, row) in design.iter().enumerate() {
@@ -29,11 +36,14 @@ impl<T: SimdReal> Fit<T> {
                 freedom += (f64::from(u8::from(o == p)) - hat).powi(2);
             }
         }
+        let has_freedom = freedom >= 1e-9;
+        let threshold = |noise: f64| noise * (1.0 + MISFIT_THRESHOLD * (2.0 / freedom).sqrt());
         Self {
             offsets: stencil.offsets().iter().map(|&(x, y)| y as isize * frame_width as isize + x as isize).collect(),
             weights: weights.iter().map(|w| w.map(T::from_f64)).collect(),
             design: design.iter().map(|b| b.map(T::from_f64)).collect(),
-            freedom: if freedom < 1e-9 { 0.0 } else { freedom },
+            freedom: if has_freedom { freedom } else { 0.0 },
+            threshold: noise.filter(|_| has_freedom).map_or(f64::MAX, threshold),
         }
     }
 }
@@ -48,17 +58,20 @@ pub(super) struct Measure<'a, T> {
     pub scale: T,
     /// Receives `MEASURED` rows of `BLOCK` for each block.
     pub measured: &'a mut [T],
-    /// Receives the root mean square residual of each site, if requested.
-    pub residual: Option<&'a mut [T]>,
+    /// Receives the root mean square residual of each site.
+    pub residual: &'a mut [T],
 }
 
 impl<T: SimdReal> Kernel<T> for Measure<'_, T> {
     type Output = ();
 
     #[inline(always)]
-    fn run<V: Lanes<Scalar = T>>(mut self) {
+    fn run<V: Lanes<Scalar = T>>(self) {
         let samples = self.frame.data();
-        let inverse = if self.fit.freedom > 0.0 { 1.0 / self.fit.freedom } else { f64::NAN };
+        let (one, zero) = (V::constant(1.0), V::zero());
+        let inverse = V::constant(if self.fit.freedom > 0.0 { 1.0 / self.fit.freedom } else { f64::NAN });
+        let (threshold, scale) = (V::constant(self.fit.threshold), V::splat(self.scale));
+        let per_sample = V::constant(1.0 / self.fit.offsets.len() as f64);
         for (b, pixels) in self.pixels.chunks_exact(BLOCK).enumerate() {
             let measured = &mut self.measured[b * MEASURED * BLOCK..(b + 1) * MEASURED * BLOCK];
             // The last block of a narrow frame repeats its last pixel: both ends alone are not enough.
@@ -67,43 +80,43 @@ impl<T: SimdReal> Kernel<T> for Measure<'_, T> {
                 let pixels = &pixels[at..at + V::LANES];
                 // Derivatives do not depend on a constant: differences from one sample keep all their digits.
                 let base = fetch::<V>(samples, pixels, self.fit.offsets[0], neighbours);
-                let mut jet = [V::zero(); 6];
+                let (mut jet, mut sum, mut squares) = ([zero; 6], zero, zero);
                 for (&offset, weights) in self.fit.offsets.iter().zip(&self.fit.weights) {
                     let z = fetch::<V>(samples, pixels, offset, neighbours) - base;
+                    sum = sum + z;
+                    squares = z.mul_add(z, squares);
                     for k in 0..6 {
                         jet[k] = z.mul_add(V::splat(weights[k]), jet[k]);
                     }
                 }
-                // Zero for finite numbers, NaN for others, whatever their weights.
-                let mut spoilt = V::zero();
-                let mut left = V::zero();
-                if self.residual.is_some() {
-                    for (&offset, row) in self.fit.offsets.iter().zip(&self.fit.design) {
-                        let mut z = fetch::<V>(samples, pixels, offset, neighbours) - base;
-                        for k in 0..6 {
-                            z = jet[k].neg_mul_add(V::splat(row[k]), z);
-                        }
-                        left = z.mul_add(z, left);
+                let mut left = zero;
+                for (&offset, row) in self.fit.offsets.iter().zip(&self.fit.design) {
+                    let mut z = fetch::<V>(samples, pixels, offset, neighbours) - base;
+                    for k in 0..6 {
+                        z = jet[k].neg_mul_add(V::splat(row[k]), z);
                     }
-                    spoilt = V::zero() * left;
-                } else {
-                    for &offset in &self.fit.offsets {
-                        spoilt = V::zero().mul_add(fetch::<V>(samples, pixels, offset, neighbours), spoilt);
-                    }
+                    left = z.mul_add(z, left);
                 }
                 jet[0] = jet[0] + base;
-                let scale = V::splat(self.scale);
+                // Zero for finite numbers, NaN for others, whatever their weights.
+                let mut spoilt = zero * left;
                 for k in 0..6 {
-                    spoilt = V::zero().mul_add(jet[k], spoilt);
+                    spoilt = zero.mul_add(jet[k], spoilt);
                 }
-                let good = V::zero().lt(V::constant(1.0) + spoilt);
+                let good = zero.lt(one + spoilt);
                 for k in 0..6 {
-                    V::select(good, jet[k] * scale, V::zero()).store(&mut measured[k * BLOCK + at..]);
+                    V::select(good, jet[k] * scale, zero).store(&mut measured[k * BLOCK + at..]);
                 }
-                V::select(good, V::constant(1.0), V::zero()).store(&mut measured[6 * BLOCK + at..]);
-                if let Some(residual) = &mut self.residual {
-                    ((left * V::constant(inverse)).sqrt() * scale).store(&mut residual[b * BLOCK + at..]);
-                }
+                V::select(good, one, zero).store(&mut measured[PRESENT * BLOCK + at..]);
+                let rms = (left * inverse).sqrt() * scale;
+                rms.store(&mut self.residual[b * BLOCK + at..]);
+                let variance = rms * rms;
+                let misfit = V::select(threshold.lt(variance), variance, zero);
+                V::select(good, misfit, zero).store(&mut measured[MISFIT * BLOCK + at..]);
+                // A misfit is above zero only where the samples differ.
+                let share = left / (sum.neg_mul_add(sum * per_sample, squares));
+                let share = V::select(zero.lt(misfit), share.min(one), zero);
+                V::select(good, share, zero).store(&mut measured[SHARE * BLOCK + at..]);
             }
         }
     }

@@ -146,6 +146,10 @@ pub struct FlowFilterOptions {
     pub process_noise: [f64; 12],
     /// Variance of the noise of one pixel, grey levels squared; > 0.
     pub measurement_noise: f64,
+    /// Takes what the frames say about the noise: the residual of each fit is noise where it exceeds that of
+    /// `measurement_noise`, and a measurement that the prediction excludes starts the brightness anew.
+    /// `false`: the patent's filter for all frames.
+    pub adaptive: bool,
     /// Mean before the first frame.
     pub initial_mean: [f64; 12],
     /// Diagonal of the covariance before the first frame; each > 0.
@@ -161,8 +165,6 @@ pub struct FlowFilterOptions {
     pub mask: Option<Mask>,
     /// Deliver the 6x6 covariance of the motion with each field (21 planes).
     pub covariance: bool,
-    /// Deliver the rms residual of the quadratic fit, grey levels: an estimate of the pixel noise.
-    pub residual: bool,
     /// Physical size `(dx, dy)` of a pixel: fields come in these units. States stay in px.
     pub pixel_pitch: (f64, f64),
     /// Seconds between frames, noted in the fields.
@@ -207,6 +209,7 @@ impl FlowFilterOptions {
             square_root: None,
             process_noise: [1e-1, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-1, 1e-1, 1e-3, 1e-3, 1e-3, 1e-3],
             measurement_noise: 1e-3,
+            adaptive: true,
             initial_mean: [0.0; 12],
             initial_covariance: [1.0; 12],
             sigma_points: SigmaPoints::default(),
@@ -214,7 +217,6 @@ impl FlowFilterOptions {
             sites: SamplingGrid::default(),
             mask: None,
             covariance: false,
-            residual: true,
             pixel_pitch: (1.0, 1.0),
             frame_period: None,
             threads: Threads::default(),

@@ -2,10 +2,11 @@
 //!
 //! One format, `.npz`: a text `header` (JSON: version, precision, sizes, options), `status` of every site (0
 //! where there is a filter, else the code of [`Status`]), `mean` `(filters, 12)`, `covariance` `(filters,
-//! 78)` (lower triangles, row by row) and, where there is one, `mask` `(height, width)`. numpy can read it.
+//! 78)` (lower triangles, row by row), `noise_scale` `(filters, 1)` and, where there is one, `mask` `(height,
+//! width)`. numpy can read it.
 
 use super::flow_filter::FlowFilter;
-use super::kernel::{N, PACKED};
+use super::kernel::{N, PACKED, SCALE};
 use super::options::FlowFilterOptions;
 use crate::error::{Error, Result};
 use crate::io::Element;
@@ -17,7 +18,7 @@ use std::io::{Cursor, Read, Seek, Write};
 use std::path::Path;
 
 /// Rises when the meaning of a file changes.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const FORMAT: &str = "jacoflow flow filter";
 
 #[derive(Serialize, Deserialize)]
@@ -81,6 +82,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         let filters = self.store.sites.len();
         writer.array("mean", &[filters, N], &self.store.gather(0, N))?;
         writer.array("covariance", &[filters, PACKED], &self.store.gather(N, PACKED))?;
+        writer.array("noise_scale", &[filters, 1], &self.store.gather(SCALE, 1))?;
         let status: Vec<u8> = self.store.fixed.iter().map(|&status| status as u8).collect();
         let (width, height) = self.options.sites.shape(self.frame_size)?;
         writer.array("status", &[height, width], &status)?;
@@ -109,6 +111,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         }
         let mean = reader.array::<T>("mean")?;
         let covariance = reader.array::<T>("covariance")?;
+        let scale = reader.array::<T>("noise_scale")?;
         // Nothing of the claimed size is allocated before the file has shown that it holds as much.
         let status = reader.array::<u8>("status")?;
         let (columns, rows) = options.sites.shape(header.frame_size).map_err(|e| wrong(e.to_string()))?;
@@ -116,7 +119,8 @@ impl<T: SimdReal + Element> FlowFilter<T> {
             return Err(wrong(format!("expected a status of shape [{rows}, {columns}], got {:?}", status.shape)));
         }
         let filters = status.values.iter().map(|&code| usize::from(code == Status::Ok as u8)).sum::<usize>();
-        for (name, array, columns) in [("mean", &mean, N), ("covariance", &covariance, PACKED)] {
+        let arrays = [("mean", &mean, N), ("covariance", &covariance, PACKED), ("noise_scale", &scale, 1)];
+        for (name, array, columns) in arrays {
             if array.shape != [filters, columns] {
                 return Err(wrong(format!("expected {name} of shape [{filters}, {columns}], got {:?}", array.shape)));
             }
@@ -127,6 +131,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         }
         filter.store.scatter(0, N, &mean.values);
         filter.store.scatter(N, PACKED, &covariance.values);
+        filter.store.scatter(SCALE, 1, &scale.values);
         filter.frames = header.frames;
         filter.repairs = header.repairs;
         Ok(filter)

@@ -1,6 +1,6 @@
 //! The states of all sites, in blocks.
 
-use super::kernel::{BLOCK, Constants, N, PACKED, PLANES, packed};
+use super::kernel::{BLOCK, Constants, N, PACKED, PLANES, SCALE, packed};
 use super::options::FlowFilterOptions;
 use crate::error::Result;
 use crate::jet::Reach;
@@ -62,6 +62,7 @@ impl<T: SimdReal> Store<T> {
                 let variance = N + packed(k, k);
                 block[variance * BLOCK..(variance + 1) * BLOCK].fill(constants.start.1[k]);
             }
+            block[SCALE * BLOCK..].fill(T::from_f64(1.0));
         }
         Ok(Self { pixels, sites, fixed, blocks })
     }

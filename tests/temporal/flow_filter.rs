@@ -12,6 +12,7 @@ use std::f64::consts::PI;
 
 mod equivalence;
 mod promises;
+mod robustness;
 
 const TRUTH: [f64; 6] = [-80.0 * PI / 100.0, 60.0 * PI / 100.0, 0.0, PI / 100.0, -PI / 100.0, 0.0];
 

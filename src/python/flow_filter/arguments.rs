@@ -64,6 +64,7 @@ impl Arguments {
             square_root: word("square_root")?.map(|name| SquareRoot::parse(&name)).transpose()?,
             process_noise: twelve(&group, "Q", base.process_noise)?,
             measurement_noise: group.get("R")?.unwrap_or(base.measurement_noise),
+            adaptive: group.get("adaptive")?.unwrap_or(base.adaptive),
             initial_mean: twelve(&group, "x0", base.initial_mean)?,
             initial_covariance: twelve(&group, "P0", base.initial_covariance)?,
             sigma_points: SigmaPoints::new(
@@ -75,7 +76,6 @@ impl Arguments {
             sites: options::grid(py, &self.grid)?,
             mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
             covariance: self.covariance,
-            residual: base.residual,
             pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(base.pixel_pitch),
             frame_period: options::frame_period(self.fps)?,
             threads: options::threads(self.threads)?,

@@ -19,7 +19,8 @@ use std::path::PathBuf;
 /// Frames are pushed one by one; each gives a FlowField in px/frame and 1/frame. States are ordered q = (I,
 /// Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y) in 8-bit grey levels, px and frames. `profile` "patent"
 /// has the patent's constants, "measured" those for raw 8-bit frames (9 x 9 pixels); a `FilterProfile`
-/// replaces single ones. The other options are those of `estimate`. Pickles in mid-stream.
+/// replaces single ones. The noise adapts to frames that are not locally quadratic. The other options are
+/// those of `estimate`. Pickles in mid-stream.
 #[pyclass(module = "jacoflow")]
 pub struct FlowFilter {
     arguments: Arguments,
@@ -34,8 +35,9 @@ impl FlowFilter {
     /// Takes in the next frame (H, W) and returns the FlowField after it, px/frame.
     ///
     /// Where a neighbourhood holds NaN the filter only predicts, and the result is NaN with status
-    /// NON_FINITE. ValueError for a frame of another size, TypeError for another dtype; the filter is then
-    /// unchanged.
+    /// NON_FINITE. Where the frame contradicts the prediction (black, flashed, dropped) the motion is that of
+    /// the frames before, with status PREDICTED. ValueError for a frame of another size, TypeError for
+    /// another dtype; the filter is then unchanged.
     fn push(&mut self, frame: &Bound<'_, PyAny>) -> PyResult<FlowField> {
         let py = frame.py();
         let frame = arrays::frame("frame", frame, self.colour)?;
@@ -57,7 +59,8 @@ impl FlowFilter {
     }
 
     /// Covariances of q, float64 array (H, W, 12, 12) or (N, 12, 12), units of `state` squared; NaN where
-    /// there is no filter. None before the first frame.
+    /// there is no filter. None before the first frame. The fields' covariance adds the systematic error of
+    /// neighbourhoods that no quadratic describes.
     #[getter]
     fn state_covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.per_site(py, self.filter.covariances()?, &[12, 12])

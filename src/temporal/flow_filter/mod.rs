@@ -2,7 +2,7 @@
 
 mod pass;
 
-use super::kernel::update::Decorrelation;
+use super::kernel::update::{Decorrelation, REPAIRED, RESTARTED};
 use super::kernel::{BLOCK, Constants};
 use super::measurement::Fit;
 use super::options::FlowFilterOptions;
@@ -12,7 +12,7 @@ use crate::jet::JetStencil;
 use crate::parallel::Threads;
 use crate::simd::{Level, SimdReal};
 use crate::types::{FieldLayout, FlowField, Frame, MOTION_NAMES, Status};
-use pass::{Mark, PAIRS, Rows};
+use pass::{COVARIANCE, Mark, PAIRS, RESIDUAL, Rows};
 use rayon::prelude::*;
 
 /// One Kalman filter a site, fed with frames: WO2010/098160, (44), (54), (55).
@@ -68,9 +68,8 @@ impl<T: SimdReal> FlowFilter<T> {
         let stencil = JetStencil::new(&options.neighbourhood, (1.0, 1.0))?;
         let constants = Constants::new(&options);
         let store = Store::new(frame_size, &options, stencil.offsets(), stencil.reach(), &constants)?;
-        let covariance = stencil.covariance().map(|row| row.map(|c| c * options.measurement_noise));
-        let decorrelation = Decorrelation::new(&covariance);
-        let fit = Fit::new(&stencil, frame_size.0);
+        let decorrelation = Decorrelation::new(&stencil.covariance(), options.measurement_noise);
+        let fit = Fit::new(&stencil, frame_size.0, options.adaptive.then_some(options.measurement_noise));
         Ok(Self { options, frame_size, frames: 0, repairs: 0, store, constants, decorrelation, fit })
     }
 
@@ -119,7 +118,11 @@ impl<T: SimdReal> FlowFilter<T> {
 
     /// Takes in the next frame; returns flow and Jacobian with the `Status` of each site.
     ///
-    /// Where a neighbourhood holds a NaN the filter only predicts; the result is NaN, `NonFinite`.
+    /// Where a neighbourhood holds a NaN the filter only predicts; the result is NaN, `NonFinite`. Where the
+    /// frame contradicts the prediction the motion is that of the frames before, `Predicted`.
+    ///
+    /// The field's covariance is that of [`state`](Self::state) and, where no quadratic describes the
+    /// neighbourhood, the systematic error of such fits.
     ///
     /// # Errors
     /// [`Error::Argument`] for a frame of another size; the filter is then unchanged.
@@ -140,14 +143,13 @@ impl<T: SimdReal> FlowFilter<T> {
         threads.install(|| pass::run(self, frame, &mut marks, &mut results))?;
         self.frames += 1;
         let live = self.store.sites.len();
-        self.repairs += marks.iter().flat_map(|m| m.repaired).take(live).map(u64::from).sum::<u64>();
+        self.repairs += marks.iter().flat_map(|m| m.events).take(live).map(|e| u64::from(e & REPAIRED)).sum::<u64>();
         threads.install(|| self.field(&marks, &results))
     }
 
     pub(super) fn rows(&self) -> Rows {
         let covariance = if self.options.covariance { 21 } else { 0 };
-        let residual = self.options.residual.then_some(6 + covariance);
-        Rows { covariance, residual, count: 6 + covariance + usize::from(residual.is_some()) }
+        Rows { covariance, count: COVARIANCE + covariance }
     }
 
     fn field(&self, marks: &[Mark], results: &[T]) -> Result<FlowField<T>> {
@@ -165,12 +167,13 @@ impl<T: SimdReal> FlowFilter<T> {
         let mut field = FlowField::<T>::empty(layout, options.covariance)?;
         let n = field.len();
         let rows = self.rows();
-        field.residual = rows.residual.map(|_| vec![T::nan(); n]);
+        let mut residual = vec![T::nan(); n];
         field.status.copy_from_slice(&self.store.fixed);
-        let flags = marks.iter().flat_map(|m| m.missing.iter().zip(&m.repaired));
-        for (&site, (&missing, &repaired)) in self.store.sites.iter().zip(flags) {
-            field.status[site] = match (missing, repaired) {
+        let flags = marks.iter().flat_map(|m| m.missing.iter().zip(&m.events));
+        for (&site, (&missing, &events)) in self.store.sites.iter().zip(flags) {
+            field.status[site] = match (missing, events) {
                 (0, 0) => Status::Ok,
+                (0, RESTARTED) => Status::Predicted,
                 (0, _) => Status::Repaired,
                 _ => Status::NonFinite,
             };
@@ -194,12 +197,11 @@ impl<T: SimdReal> FlowFilter<T> {
         field.motion.par_chunks_exact_mut(n).enumerate().for_each(|(k, plane)| fill(plane, k, units[k]));
         if let Some(covariance) = &mut field.covariance {
             covariance.par_chunks_exact_mut(n).zip(&PAIRS[..]).enumerate().for_each(|(k, (plane, &(a, b)))| {
-                fill(plane, 6 + k, units[a] * units[b]);
+                fill(plane, COVARIANCE + k, units[a] * units[b]);
             });
         }
-        if let Some((plane, row)) = field.residual.as_mut().zip(rows.residual) {
-            fill(plane, row, 1.0);
-        }
+        fill(&mut residual, RESIDUAL, 1.0);
+        field.residual = Some(residual);
         Ok(field)
     }
 }

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::simd::{Level, SimdReal, dispatch};
 use crate::temporal::kernel::predict::{AUGMENTED, EXTENDED, FAST, NON_AUGMENTED, Predict};
 use crate::temporal::kernel::transition::{Exact, Rk4, Step};
-use crate::temporal::kernel::update::{Decorrelation, MEASURED, Update};
+use crate::temporal::kernel::update::{Decorrelation, MEASURED, PRESENT, SHARE, Update};
 use crate::temporal::kernel::{BLOCK, Constants, N, PLANES, packed};
 use crate::temporal::measurement::{Fit, Measure};
 use crate::temporal::options::{FilterForm, Transition};
@@ -18,6 +18,15 @@ use std::marker::PhantomData;
 const TASK_BLOCKS: usize = 32;
 /// Blocks that pass the three kernels together: few, so that their states stay in the first-level cache.
 const PASS_BLOCKS: usize = 2;
+
+/// Relative error of the motion for a fit that describes nothing: fits attenuate derivatives. It falls with
+/// the fourth root of the share of the variance that the fit leaves. By `benchmarks/tables/flow_filter.py`.
+const ATTENUATION: f64 = 0.27;
+/// Error of the Jacobian for such a fit, over the squared motion in units of the neighbourhood: structure
+/// that moves in looks like contraction, most of all along the motion. It falls with the share's root.
+const CONTRACTION: f64 = 1.2;
+/// Contraction across the motion over that along it.
+const ACROSS: f64 = 0.25;
 
 /// The kernels are compiled here, for both precisions, and not again in every crate that uses a filter: hence
 /// functions that are not generic, with [`Any`] between them.
@@ -68,6 +77,8 @@ fn every_block<T: SimdReal>(filter: &mut FlowFilter<T>, frame: &Frame<T>, marks:
         form: options.form,
         transition: options.transition,
         scale: T::from_f64(255.0 / options.full_scale),
+        contraction: T::from_f64(CONTRACTION / options.neighbourhood.spread().powi(2)),
+        is_first: filter.frames == 0,
     };
     let states = store.blocks.par_chunks_mut(PLANES * BLOCK * TASK_BLOCKS);
     let pixels = store.pixels.par_chunks(BLOCK * TASK_BLOCKS);
@@ -84,13 +95,17 @@ fn every_block<T: SimdReal>(filter: &mut FlowFilter<T>, frame: &Frame<T>, marks:
     });
 }
 
-/// Rows of `BLOCK` numbers in a block's results: six of motion, then covariance and residual if requested.
+/// Rows of `BLOCK` numbers in a block's results: six of motion, the residual, then any covariance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Rows {
     pub covariance: usize,
-    pub residual: Option<usize>,
     pub count: usize,
 }
+
+/// Row of the residual.
+pub(super) const RESIDUAL: usize = 6;
+/// First row of the covariance.
+pub(super) const COVARIANCE: usize = 7;
 
 /// The upper triangle of the motion's covariance, row by row.
 pub(super) const PAIRS: [(usize, usize); 21] = {
@@ -118,39 +133,58 @@ struct Pass<'a, T> {
     form: FilterForm,
     transition: Transition,
     scale: T,
+    contraction: T,
+    is_first: bool,
 }
 
 impl<T: SimdReal> Pass<'_, T> {
     fn run(&self, blocks: &mut [T], pixels: &[usize], marks: &mut [Mark], results: &mut [T]) {
-        let Self { frame, fit, constants, decorrelation, rows, level, scale, .. } = *self;
+        let Self { frame, fit, constants, decorrelation, rows, level, scale, is_first, .. } = *self;
         let zero = T::from_f64(0.0);
         let (mut measured, mut residual) = ([zero; PASS_BLOCKS * MEASURED * BLOCK], [zero; PASS_BLOCKS * BLOCK]);
-        let mut repaired = [0u8; PASS_BLOCKS * BLOCK];
+        let mut events = [0u8; PASS_BLOCKS * BLOCK];
         let measured = &mut measured[..marks.len() * MEASURED * BLOCK];
-        let repaired = &mut repaired[..pixels.len()];
-        let wanted = rows.residual.map(|_| &mut residual[..pixels.len()]);
-        dispatch(level, Measure { frame, pixels, fit, scale, measured, residual: wanted });
+        let (events, residual) = (&mut events[..pixels.len()], &mut residual[..pixels.len()]);
+        dispatch(level, Measure { frame, pixels, fit, scale, measured, residual });
         match self.transition {
-            Transition::Rk4 => predict::<T, Rk4>(level, self.form, blocks, repaired, constants),
-            Transition::Exact => predict::<T, Exact>(level, self.form, blocks, repaired, constants),
+            Transition::Rk4 => predict::<T, Rk4>(level, self.form, blocks, events, constants),
+            Transition::Exact => predict::<T, Exact>(level, self.form, blocks, events, constants),
         }
-        dispatch(level, Update { blocks, measured, repaired, decorrelation, constants });
+        dispatch(level, Update { blocks, measured, events, decorrelation, constants, is_first });
         for (b, mark) in marks.iter_mut().enumerate() {
-            mark.repaired.copy_from_slice(&repaired[b * BLOCK..(b + 1) * BLOCK]);
-            let present = &measured[(b * MEASURED + 6) * BLOCK..][..BLOCK];
-            for k in 0..BLOCK {
-                mark.missing[k] = u8::from(present[k] == zero);
+            mark.events.copy_from_slice(&events[b * BLOCK..(b + 1) * BLOCK]);
+            let row = |k: usize| &measured[(b * MEASURED + k) * BLOCK..][..BLOCK];
+            for (missing, &present) in mark.missing.iter_mut().zip(row(PRESENT)) {
+                *missing = u8::from(present == zero);
             }
             let block = &blocks[b * PLANES * BLOCK..];
             let out = &mut results[b * rows.count * BLOCK..(b + 1) * rows.count * BLOCK];
             out[..6 * BLOCK].copy_from_slice(&block[6 * BLOCK..N * BLOCK]);
-            for (row, &(i, j)) in out[6 * BLOCK..].chunks_exact_mut(BLOCK).zip(&PAIRS[..rows.covariance]) {
+            out[RESIDUAL * BLOCK..COVARIANCE * BLOCK].copy_from_slice(&residual[b * BLOCK..(b + 1) * BLOCK]);
+            let (motion, covariance) = out.split_at_mut(COVARIANCE * BLOCK);
+            for (row, &(i, j)) in covariance.chunks_exact_mut(BLOCK).zip(&PAIRS[..rows.covariance]) {
                 let plane = N + packed(6 + i, 6 + j);
                 row.copy_from_slice(&block[plane * BLOCK..(plane + 1) * BLOCK]);
             }
-            if let Some(row) = rows.residual {
-                out[row * BLOCK..].copy_from_slice(&residual[b * BLOCK..(b + 1) * BLOCK]);
+            let shares = row(SHARE).iter().enumerate().filter(|&(_, &share)| rows.covariance > 0 && share > zero);
+            for (k, &share) in shares {
+                self.add_systematic(share, std::array::from_fn(|m| motion[m * BLOCK + k]), &mut covariance[k..]);
             }
+        }
+    }
+
+    /// Adds the systematic error of a fit that leaves `share` of the variance to a pixel's covariance, whose
+    /// entries lie `BLOCK` apart.
+    fn add_systematic(&self, share: T, motion: [T; 6], covariance: &mut [T]) {
+        let root = share.sqrt();
+        let [u, v, ..] = motion;
+        let attenuated = motion.map(|m| T::from_f64(ATTENUATION) * root.sqrt() * m);
+        let (zero, across) = (T::from_f64(0.0), T::from_f64(ACROSS) * (u * u + v * v));
+        let contracted = [zero, zero, u * u + across, u * v, u * v, v * v + across];
+        let contracted = contracted.map(|m| self.contraction * root * m);
+        for (entry, &(a, b)) in covariance.iter_mut().step_by(BLOCK).zip(&PAIRS) {
+            let own = if a == b { attenuated[a] * attenuated[a] } else { zero };
+            *entry = *entry + own + contracted[a] * contracted[b];
         }
     }
 }
@@ -158,7 +192,7 @@ impl<T: SimdReal> Pass<'_, T> {
 /// Events at the pixels of a block.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Mark {
-    pub repaired: [u8; BLOCK],
+    pub events: [u8; BLOCK],
     pub missing: [u8; BLOCK],
 }
 
@@ -166,16 +200,16 @@ fn predict<T: SimdReal, S: Step>(
     level: Level,
     form: FilterForm,
     blocks: &mut [T],
-    repaired: &mut [u8],
+    events: &mut [u8],
     constants: &Constants<T>,
 ) {
     let step = PhantomData::<S>;
     match form {
-        FilterForm::Augmented => dispatch(level, Predict::<T, S, AUGMENTED> { blocks, repaired, constants, step }),
+        FilterForm::Augmented => dispatch(level, Predict::<T, S, AUGMENTED> { blocks, events, constants, step }),
         FilterForm::NonAugmented => {
-            dispatch(level, Predict::<T, S, NON_AUGMENTED> { blocks, repaired, constants, step });
+            dispatch(level, Predict::<T, S, NON_AUGMENTED> { blocks, events, constants, step });
         }
-        FilterForm::Fast => dispatch(level, Predict::<T, S, FAST> { blocks, repaired, constants, step }),
-        FilterForm::Extended => dispatch(level, Predict::<T, S, EXTENDED> { blocks, repaired, constants, step }),
+        FilterForm::Fast => dispatch(level, Predict::<T, S, FAST> { blocks, events, constants, step }),
+        FilterForm::Extended => dispatch(level, Predict::<T, S, EXTENDED> { blocks, events, constants, step }),
     }
 }

@@ -21,8 +21,10 @@ use crate::simd::{Lanes, SimdReal};
 pub(super) const N: usize = 12;
 /// Entries of a packed lower triangle of the covariance.
 pub(super) const PACKED: usize = N * (N + 1) / 2;
-/// Numbers of one pixel's state: mean, then covariance.
-pub(super) const PLANES: usize = N + PACKED;
+/// Plane of the noise scale: by how much the innovations say that the misfit varies from frame to frame.
+pub(super) const SCALE: usize = N + PACKED;
+/// Numbers of one pixel's state: mean, covariance, noise scale.
+pub(super) const PLANES: usize = SCALE + 1;
 /// Pixels of one block: the widest lanes. A block is `PLANES` rows of `BLOCK` values.
 pub(super) const BLOCK: usize = 16;
 
@@ -43,6 +45,8 @@ pub(super) struct Constants<T> {
     pub shift: T,
     /// Whether the square root takes the motion first.
     pub motion_first: bool,
+    /// Normalised innovation squared beyond which the brightness starts anew.
+    pub gate: T,
     /// Mean and covariance diagonal of a filter that starts.
     pub start: ([T; N], [T; N]),
 }
@@ -56,6 +60,7 @@ impl<T: SimdReal> Constants<T> {
             spread: T::from_f64(points.spread(n).sqrt()),
             shift: T::from_f64(points.beta - points.alpha * points.alpha),
             motion_first: options.motion_first(),
+            gate: T::from_f64(if options.adaptive { update::GATE } else { f64::MAX }),
             start: (options.initial_mean.map(T::from_f64), options.initial_covariance.map(T::from_f64)),
         }
     }

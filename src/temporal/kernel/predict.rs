@@ -4,6 +4,7 @@ use super::factor::{Columns, factor, repair};
 use super::moments::{cross, outer};
 use super::noise::noise_pairs;
 use super::transition::{Generator, Step};
+use super::update::REPAIRED;
 use super::vector::{minus, plus, six, times};
 use super::{BLOCK, Constants, Lane, N, PLANES, failed, packed};
 use crate::simd::{Kernel, Lanes, SimdReal};
@@ -44,8 +45,8 @@ impl<V: Lanes> Scratch<V> {
 pub(in crate::temporal) struct Predict<'a, T, S, const FORM: u8> {
     /// States.
     pub blocks: &'a mut [T],
-    /// Set to one for each pixel that was repaired.
-    pub repaired: &'a mut [u8],
+    /// Receives [`REPAIRED`] of each pixel.
+    pub events: &'a mut [u8],
     pub constants: &'a Constants<T>,
     pub step: PhantomData<S>,
 }
@@ -57,8 +58,7 @@ impl<T: SimdReal, S: Step, const FORM: u8> Kernel<T> for Predict<'_, T, S, FORM>
     fn run<V: Lanes<Scalar = T>>(self) {
         let motion_first = FORM == FAST || (FORM != EXTENDED && self.constants.motion_first);
         let mut scratch = Scratch::<V>::new();
-        for (block, repaired) in self.blocks.chunks_exact_mut(PLANES * BLOCK).zip(self.repaired.chunks_exact_mut(BLOCK))
-        {
+        for (block, events) in self.blocks.chunks_exact_mut(PLANES * BLOCK).zip(self.events.chunks_exact_mut(BLOCK)) {
             for at in (0..BLOCK).step_by(V::LANES) {
                 let mut lane = loop {
                     let lane = Lane::<V>::load(block, at);
@@ -73,7 +73,7 @@ impl<T: SimdReal, S: Step, const FORM: u8> Kernel<T> for Predict<'_, T, S, FORM>
                     }
                     for k in (0..V::LANES).filter(|k| bad >> k & 1 == 1) {
                         repair(block, at + k, self.constants);
-                        repaired[at + k] = 1;
+                        events[at + k] |= REPAIRED;
                     }
                 };
                 predict::<V, S, FORM>(&mut lane, &mut scratch, self.constants);

@@ -3,13 +3,26 @@
 //! The measured jet has covariance `C = r (B^T B)^-1`. A unit triangular change of variables `i* = T i` makes
 //! it diagonal (for rectangles only `I* = I + a Ixx + b Iyy` differs from `I`; for 3x3 pixels it is their
 //! mean), so that each component is taken in by itself.
+//!
+//! Where the quadratic does not describe the neighbourhood, its misfit is noise of the measurement, and it
+//! enters the brightness as process noise, because another part of it lies in the neighbourhood after each
+//! frame. A measurement that the prediction excludes starts the brightness anew and leaves the motion.
 
 // Unrolled loops compare constant indices, the smallest of which is zero.
 #![allow(clippy::absurd_extreme_comparisons)]
 
 use super::vector::for_six;
-use super::{BLOCK, Constants, Lane, N, PACKED, PLANES, failed, packed};
+use super::{BLOCK, Constants, Lane, N, PACKED, PLANES, SCALE, failed, packed};
 use crate::simd::{Kernel, Lanes, SimdReal};
+
+/// Normalised innovation squared beyond which the brightness starts anew: chi-square(6), one in ten thousand.
+pub(super) const GATE: f64 = 27.86;
+/// Frames over which the noise scale follows the normalised innovations.
+const SCALE_MEMORY: f64 = 16.0;
+/// Maximum noise scale.
+const MAX_SCALE: f64 = 100.0;
+/// Factor of the motion's covariance when the brightness starts anew: the motion may have changed, too.
+const INFLATION: f64 = 2.0;
 
 /// What is measured, in working precision.
 #[derive(Debug, Clone)]
@@ -19,13 +32,18 @@ pub(in crate::temporal) struct Decorrelation<T> {
     pub steps: Vec<(usize, usize, T)>,
     /// Variances of the six decorrelated components.
     pub variances: [T; 6],
+    /// Variance of the pixel noise that they are for.
+    pub noise: T,
+    /// The jet's covariance for pixel noise of variance 1: lower triangle.
+    pub unit: [T; 21],
 }
 
 impl<T: SimdReal> Decorrelation<T> {
-    /// From the jet's covariance, by its `L D L^T` factors with `I` taken last.
-    pub(in crate::temporal) fn new(covariance: &[[f64; 6]; 6]) -> Self {
+    /// From the jet's covariance for unit pixel noise and the noise's variance, by `L D L^T` factors with `I`
+    /// taken last.
+    pub(in crate::temporal) fn new(covariance: &[[f64; 6]; 6], noise: f64) -> Self {
         const ORDER: [usize; 6] = [1, 2, 3, 4, 5, 0];
-        let mut rest = *covariance;
+        let mut rest = covariance.map(|row| row.map(|c| c * noise));
         let (mut variances, mut steps) = ([0.0; 6], Vec::new());
         for (place, &j) in ORDER.iter().enumerate() {
             variances[j] = rest[j][j];
@@ -45,7 +63,13 @@ impl<T: SimdReal> Decorrelation<T> {
                 }
             }
         }
-        Self { steps, variances: variances.map(T::from_f64) }
+        let mut unit = [T::from_f64(0.0); 21];
+        for a in 0..6 {
+            for b in 0..=a {
+                unit[packed(a, b)] = T::from_f64(covariance[a][b]);
+            }
+        }
+        Self { steps, variances: variances.map(T::from_f64), noise: T::from_f64(noise), unit }
     }
 }
 
@@ -53,16 +77,29 @@ impl<T: SimdReal> Decorrelation<T> {
 pub(in crate::temporal) struct Update<'a, T> {
     /// States.
     pub blocks: &'a mut [T],
-    /// Measured jets, six rows of `BLOCK` for each block, then a row that is one where measured, else zero.
+    /// Measured jets, six rows of `BLOCK` for each block, then `PRESENT`, `MISFIT` and `SHARE`.
     pub measured: &'a [T],
-    /// Set to one for each pixel that was repaired.
-    pub repaired: &'a mut [u8],
+    /// Receives [`REPAIRED`] and [`RESTARTED`] of each pixel.
+    pub events: &'a mut [u8],
     pub decorrelation: &'a Decorrelation<T>,
     pub constants: &'a Constants<T>,
+    /// Whether this is the first frame: no prediction of it exists.
+    pub is_first: bool,
 }
 
+/// Row of a measurement that is one where measured, else zero.
+pub(in crate::temporal) const PRESENT: usize = 6;
+/// Row of the residual variance of sites that a quadratic does not describe, grey levels squared.
+pub(in crate::temporal) const MISFIT: usize = 7;
+/// Row of the misfit as a share of the neighbourhood's variance.
+pub(in crate::temporal) const SHARE: usize = 8;
 /// Rows of the measurement of one block.
-pub(in crate::temporal) const MEASURED: usize = 7;
+pub(in crate::temporal) const MEASURED: usize = 9;
+
+/// Event of a pixel whose covariance was repaired.
+pub(in crate::temporal) const REPAIRED: u8 = 1;
+/// Event of a pixel whose brightness started anew.
+pub(in crate::temporal) const RESTARTED: u8 = 2;
 
 impl<T: SimdReal> Kernel<T> for Update<'_, T> {
     type Output = ();
@@ -71,23 +108,37 @@ impl<T: SimdReal> Kernel<T> for Update<'_, T> {
     fn run<V: Lanes<Scalar = T>>(self) {
         let blocks = self.blocks.chunks_exact_mut(PLANES * BLOCK);
         let inputs = self.measured.chunks_exact(MEASURED * BLOCK);
-        for ((block, input), repaired) in blocks.zip(inputs).zip(self.repaired.chunks_exact_mut(BLOCK)) {
+        let gate = if self.is_first { V::constant(f64::MAX) } else { V::splat(self.constants.gate) };
+        for ((block, input), events) in blocks.zip(inputs).zip(self.events.chunks_exact_mut(BLOCK)) {
             for at in (0..BLOCK).step_by(V::LANES) {
                 let mut lane = Lane::<V>::load(block, at);
                 let mut jet = [V::zero(); 6];
                 for k in 0..6 {
                     jet[k] = V::load(&input[k * BLOCK + at..]);
                 }
-                let present = V::load(&input[6 * BLOCK + at..]);
-                update(&mut lane, &mut jet, present, self.decorrelation);
+                let scale = V::load(&block[SCALE * BLOCK + at..]);
+                let given = Given {
+                    present: V::load(&input[PRESENT * BLOCK + at..]),
+                    misfit: V::load(&input[MISFIT * BLOCK + at..]),
+                    scale,
+                    gate,
+                };
+                let (innovation, restarted) = update(&mut lane, &mut jet, &given, self.decorrelation, self.constants);
+                if !self.is_first {
+                    let change = innovation.mul_add(V::constant(1.0 / 6.0), -given.present);
+                    let scale = (scale * change).mul_add(V::constant(1.0 / SCALE_MEMORY), scale);
+                    let scale = scale.max(V::constant(1.0)).min(V::constant(MAX_SCALE));
+                    scale.store(&mut block[SCALE * BLOCK + at..]);
+                }
                 let bad = failed(sound(&lane));
                 lane.store(block, at);
-                if bad != 0 {
-                    for k in 0..V::LANES {
-                        if bad >> k & 1 == 1 {
-                            super::factor::repair(block, at + k, self.constants);
-                            repaired[at + k] = 1;
-                        }
+                for k in 0..V::LANES {
+                    if bad >> k & 1 == 1 {
+                        super::factor::repair(block, at + k, self.constants);
+                        events[at + k] |= REPAIRED;
+                    }
+                    if restarted >> k & 1 == 1 {
+                        events[at + k] |= RESTARTED;
                     }
                 }
             }
@@ -95,11 +146,35 @@ impl<T: SimdReal> Kernel<T> for Update<'_, T> {
     }
 }
 
+/// What an update is given beside the jet.
+struct Given<V> {
+    present: V,
+    misfit: V,
+    scale: V,
+    gate: V,
+}
+
 /// Only the brightness block is updated component by component; columns of the other blocks take the same six
-/// elimination steps in registers, and the motion block takes all six at once.
+/// elimination steps in registers, and the motion block takes all six at once. Returns the normalised
+/// innovation squared, at most the gate, and the lanes whose brightness started anew, as bits.
 #[inline(always)]
-fn update<V: Lanes>(lane: &mut Lane<V>, jet: &mut [V; 6], present: V, decorrelation: &Decorrelation<V::Scalar>) {
+fn update<V: Lanes>(
+    lane: &mut Lane<V>,
+    jet: &mut [V; 6],
+    given: &Given<V>,
+    decorrelation: &Decorrelation<V::Scalar>,
+    constants: &Constants<V::Scalar>,
+) -> (V, u32) {
     let steps = &decorrelation.steps;
+    let entering = given.misfit * given.scale;
+    for k in 0..21 {
+        lane.cov[k] = entering.mul_add(V::splat(decorrelation.unit[k]), lane.cov[k]);
+    }
+    let mut variances = [V::zero(); 6];
+    let ratio = (given.misfit / V::splat(decorrelation.noise)).max(V::constant(1.0));
+    for k in 0..6 {
+        variances[k] = V::splat(decorrelation.variances[k]) * ratio;
+    }
     // The two steps of a rectangle are known beforehand; written out they cost no address arithmetic.
     let rectangle = match steps[..] {
         [(0, 3, x), (0, 5, y)] => Some((V::splat(x), V::splat(y))),
@@ -116,7 +191,17 @@ fn update<V: Lanes>(lane: &mut Lane<V>, jet: &mut [V; 6], present: V, decorrelat
             combine(lane, row, source, factor);
         }
     }
-    let elimination = brightness_block(lane, jet, present, &decorrelation.variances);
+    let elimination = brightness_block(lane, jet, given.present, &variances);
+    let mut innovation = V::zero();
+    for k in 0..6 {
+        let normalised = elimination.innovation[k] * elimination.inverse[k];
+        innovation = normalised.mul_add(elimination.innovation[k], innovation);
+    }
+    let excluded = given.gate.lt(innovation);
+    let restarted = failed(V::select(excluded, V::zero(), V::constant(1.0)));
+    if restarted != 0 {
+        restart(lane, jet, excluded, &variances, constants);
+    }
     let (mut rows, mut gains) = ([[V::zero(); 6]; 6], [[V::zero(); 6]; 6]);
     for m in 0..6 {
         let mut column = [V::zero(); 6];
@@ -142,6 +227,40 @@ fn update<V: Lanes>(lane: &mut Lane<V>, jet: &mut [V; 6], present: V, decorrelat
     } else {
         for &(row, source, factor) in steps.iter().rev() {
             combine(lane, row, source, -V::splat(factor));
+        }
+    }
+    (innovation.min(given.gate), restarted)
+}
+
+/// Takes the measurement for the brightness, independent of the motion, where the prediction is excluded. The
+/// motion stays, with a covariance that grows up to that of the start.
+#[inline(always)]
+fn restart<V: Lanes>(
+    lane: &mut Lane<V>,
+    jet: &[V; 6],
+    excluded: V::Mask,
+    variances: &[V; 6],
+    constants: &Constants<V::Scalar>,
+) {
+    let (zero, inflation) = (V::zero(), V::constant(INFLATION));
+    let mut factor = inflation;
+    for a in 0..6 {
+        let start = V::splat(constants.start.1[6 + a]);
+        let variance = lane.cov[packed(6 + a, 6 + a)];
+        factor = V::select(start.lt(variance * inflation), V::constant(1.0), factor);
+        lane.mean[a] = V::select(excluded, jet[a], lane.mean[a]);
+        for b in 0..6 {
+            lane.cov[packed(6 + a, b)] = V::select(excluded, zero, lane.cov[packed(6 + a, b)]);
+            if b <= a {
+                let own = if a == b { variances[a] } else { zero };
+                lane.cov[packed(a, b)] = V::select(excluded, own, lane.cov[packed(a, b)]);
+            }
+        }
+    }
+    for a in 0..6 {
+        for b in 0..=a {
+            let at = packed(6 + a, 6 + b);
+            lane.cov[at] = V::select(excluded, lane.cov[at] * factor, lane.cov[at]);
         }
     }
 }
@@ -228,12 +347,12 @@ impl<V: Lanes> Elimination<V> {
 /// Updates mean and covariance of the brightness with six components of variances `r`. A component's own row
 /// is multiplied by `r / s`: no cancellation.
 #[inline(always)]
-fn brightness_block<V: Lanes>(lane: &mut Lane<V>, jet: &[V; 6], present: V, r: &[V::Scalar; 6]) -> Elimination<V> {
+fn brightness_block<V: Lanes>(lane: &mut Lane<V>, jet: &[V; 6], present: V, r: &[V; 6]) -> Elimination<V> {
     let (zero, missing) = (V::zero(), V::constant(1.0) - present);
     let mut all = Elimination { gain: [[zero; 6]; 6], keep: [zero; 6], inverse: [zero; 6], innovation: [zero; 6] };
     macro_rules! each {
         ($($j:literal)*) => {$({
-            let r = V::splat(r[$j]);
+            let r = r[$j];
             all.inverse[$j] = present / (lane.cov[packed($j, $j)] + r);
             all.keep[$j] = r.mul_add(all.inverse[$j], missing);
             all.innovation[$j] = jet[$j] - lane.mean[$j];

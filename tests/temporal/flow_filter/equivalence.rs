@@ -94,7 +94,13 @@ fn every_level_equals_the_generic_filter_with_every_pixel_measured() {
         let want = oracle(&frames, at, form, side, false);
         for level in Level::available() {
             let neighbourhood = Neighbourhood::square(side);
-            let options = FlowFilterOptions { form, neighbourhood, simd: Some(level), ..FlowFilterOptions::patent() };
+            let options = FlowFilterOptions {
+                form,
+                neighbourhood,
+                simd: Some(level),
+                adaptive: false,
+                ..FlowFilterOptions::patent()
+            };
             let mut filter = FlowFilter::<f64>::new((40, 16), options).unwrap();
             for (frame, want) in frames.iter().zip(&want) {
                 filter.push(frame).unwrap();
@@ -111,7 +117,7 @@ fn thirteen_points_equal_twenty_five_that_take_the_motion_first() {
     let frames: Vec<_> = (0..25).map(|t| texture(16, 16, t)).collect();
     let want = oracle(&frames, (8, 8), FilterForm::NonAugmented, 3, true);
     let sites = SamplingGrid::Points(vec![(8, 8)]);
-    let options = FlowFilterOptions { form: FilterForm::Fast, sites, ..FlowFilterOptions::patent() };
+    let options = FlowFilterOptions { form: FilterForm::Fast, sites, adaptive: false, ..FlowFilterOptions::patent() };
     let mut filter = FlowFilter::<f64>::new((16, 16), options).unwrap();
     for (frame, want) in frames.iter().zip(&want) {
         filter.push(frame).unwrap();
@@ -128,6 +134,7 @@ fn any_neighbourhood_updates_as_its_pixels_would() {
         neighbourhood: Neighbourhood::Points { offsets: offsets.clone(), sigma: None },
         form: FilterForm::NonAugmented,
         sites: SamplingGrid::Points(vec![(8, 8)]),
+        adaptive: false,
         ..FlowFilterOptions::patent()
     };
     let mut filter = FlowFilter::<f64>::new((16, 16), options).unwrap();

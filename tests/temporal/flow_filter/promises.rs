@@ -79,6 +79,7 @@ fn options_survive_saving() {
         sites: SamplingGrid::Grid { region: Some(Rect { x: 2, y: 1, width: 15, height: 9 }), stride: 2 },
         mask: Some(mask),
         form: FilterForm::Fast,
+        adaptive: false,
         transition: Transition::Exact,
         simd: Some(Level::SCALAR),
         pixel_pitch: (0.5, 0.25),
@@ -116,37 +117,31 @@ fn broken_states_are_refused_with_words() {
 
 #[test]
 fn bad_pixels_damage_only_what_they_touch_and_only_for_a_while() {
-    let options = FlowFilterOptions { residual: false, ..FlowFilterOptions::patent() };
-    for residual in [false, true] {
-        let options = FlowFilterOptions { residual, ..options.clone() };
-        let mut clean = FlowFilter::<f64>::new((40, 30), options.clone()).unwrap();
-        let mut spoilt = FlowFilter::<f64>::new((40, 30), options).unwrap();
-        for t in 0..5 {
-            let frame = texture(40, 30, t);
-            let mut bad = frame.clone();
-            if t == 2 {
-                bad.row_mut(10)[12] = f64::NAN;
-                bad.row_mut(20)[30] = f64::INFINITY;
-            }
-            let (a, b) = (clean.push(&frame).unwrap(), spoilt.push(&bad).unwrap());
-            for y in 0..30usize {
-                for x in 0..40usize {
-                    let near = |cx: usize, cy: usize| x.abs_diff(cx) <= 1 && y.abs_diff(cy) <= 1;
-                    let (site, touched) = (y * 40 + x, near(12, 10) || near(30, 20));
-                    if touched && t == 2 {
-                        assert_eq!(b.status[site], Status::NonFinite);
-                        assert!(b.motion[site].is_nan());
-                        // It has predicted: its uncertainty grew.
-                        let (p, q) = (spoilt.state(site).unwrap(), clean.state(site).unwrap());
-                        assert!(p.1[6][6] > q.1[6][6] && p.0.iter().all(|v| v.is_finite()));
-                    } else if !(touched && t > 2) {
-                        assert_eq!(
-                            (a.status[site], a.motion[site].to_bits()),
-                            (b.status[site], b.motion[site].to_bits())
-                        );
-                    } else {
-                        assert_eq!(b.status[site], Status::Ok);
-                    }
+    let options = FlowFilterOptions::patent();
+    let mut clean = FlowFilter::<f64>::new((40, 30), options.clone()).unwrap();
+    let mut spoilt = FlowFilter::<f64>::new((40, 30), options).unwrap();
+    for t in 0..5 {
+        let frame = texture(40, 30, t);
+        let mut bad = frame.clone();
+        if t == 2 {
+            bad.row_mut(10)[12] = f64::NAN;
+            bad.row_mut(20)[30] = f64::INFINITY;
+        }
+        let (a, b) = (clean.push(&frame).unwrap(), spoilt.push(&bad).unwrap());
+        for y in 0..30usize {
+            for x in 0..40usize {
+                let near = |cx: usize, cy: usize| x.abs_diff(cx) <= 1 && y.abs_diff(cy) <= 1;
+                let (site, touched) = (y * 40 + x, near(12, 10) || near(30, 20));
+                if touched && t == 2 {
+                    assert_eq!(b.status[site], Status::NonFinite);
+                    assert!(b.motion[site].is_nan());
+                    // It has predicted: its uncertainty grew.
+                    let (p, q) = (spoilt.state(site).unwrap(), clean.state(site).unwrap());
+                    assert!(p.1[6][6] > q.1[6][6] && p.0.iter().all(|v| v.is_finite()));
+                } else if !(touched && t > 2) {
+                    assert_eq!((a.status[site], a.motion[site].to_bits()), (b.status[site], b.motion[site].to_bits()));
+                } else {
+                    assert_eq!(b.status[site], Status::Ok);
                 }
             }
         }
@@ -204,7 +199,7 @@ fn p_status(filter: &mut FlowFilter<f64>, site: usize) -> Status {
 fn grey_scale_pitch_and_covariance_are_in_their_units() {
     let frames: Vec<_> = (0..4).map(|t| texture(16, 16, t)).collect();
     let sites = SamplingGrid::Points(vec![(8, 8)]);
-    let options = FlowFilterOptions { sites, covariance: true, ..FlowFilterOptions::patent() };
+    let options = FlowFilterOptions { sites, covariance: true, adaptive: false, ..FlowFilterOptions::patent() };
     let scaled = FlowFilterOptions { full_scale: 1.0, pixel_pitch: (2.0, 0.5), ..options.clone() };
     let mut a = FlowFilter::<f64>::new((16, 16), options).unwrap();
     let mut b = FlowFilter::<f64>::new((16, 16), scaled).unwrap();
