@@ -5,11 +5,12 @@
 #![allow(clippy::print_stdout)]
 
 use jacoflow::flow::coarse_to_fine::{CoarseToFineOptions, Preset};
-use jacoflow::flow::{Estimator, EstimatorOptions, Method};
+use jacoflow::flow::{Estimator, EstimatorOptions, InitialFlow, Method};
 use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
-use jacoflow::synth::{AffineTexture, Scene, Sensor, mean_truth};
+use jacoflow::synth::{AffineTexture, Scene, SceneOptions, Sensor, build, mean_truth};
 use jacoflow::types::{FlowField, Frame, Rect, SamplingGrid, Status};
+use std::sync::Arc;
 
 const SIZE: usize = 160;
 /// Left out along each side, px: what enters the frame has no counterpart.
@@ -292,4 +293,56 @@ fn options_that_mean_nothing_are_refused_by_name() {
     assert!(refused(CoarseToFineOptions { frames: 4, ..Default::default() }).contains("frames"));
     assert!(refused(CoarseToFineOptions { levels: Some(0), ..Default::default() }).contains("levels"));
     assert!(Preset::parse("quick").unwrap_err().to_string().contains("preset"));
+}
+
+/// The same flow at every pixel as a start, but for holes.
+fn initial(size: usize, (u, v): (f32, f32)) -> EstimatorOptions {
+    let plane = |value: f32| (0..size * size).map(|k| if k % 7 == 0 { f32::NAN } else { value }).collect::<Vec<_>>();
+    let flow = InitialFlow::new((size, size), &plane(u), &plane(v)).unwrap();
+    EstimatorOptions { initial: Some(Arc::new(flow)), covariance: true, ..EstimatorOptions::default() }
+}
+
+#[test]
+fn a_motion_of_100_px_is_found_from_a_start_that_is_wrong_by_two() {
+    const SIDE: usize = 400;
+    for (seed, shift) in [(3, (80.0, -60.0)), (4, (-60.0, -80.0))] {
+        let still = ["u_x", "v_x", "u_y", "v_y"].map(|name| (name.to_string(), 0.0));
+        let values = [("u".to_string(), shift.0), ("v".to_string(), shift.1)].into_iter().chain(still).collect();
+        let (carrier, random_state) = (Some("speckle".into()), seed);
+        let options = SceneOptions { width: SIDE, height: SIDE, random_state, carrier, values, ..Default::default() };
+        let frames = frames(&*build("affine", &options).unwrap(), 1.0, &[0.0, 1.0]);
+        let errors = |common: EstimatorOptions| {
+            let field = estimate(CoarseToFineOptions::pair(), common, &frames);
+            let inner = (110..SIDE - 110).flat_map(|y| (110..SIDE - 110).map(move |x| y * SIDE + x));
+            let error =
+                |k: usize| (field.motion[k] as f64 - shift.0).hypot(field.motion[SIDE * SIDE + k] as f64 - shift.1);
+            let mut inner: Vec<f64> = inner.map(error).collect();
+            inner.sort_by(f64::total_cmp);
+            let corner = ((shift.0 > 0.0) as usize * (SIDE - 20) + 10, (shift.1 > 0.0) as usize * (SIDE - 20) + 10);
+            (inner[inner.len() / 2], inner[inner.len() * 99 / 100], error(corner.1 * SIDE + corner.0))
+        };
+        let plain = errors(EstimatorOptions::default());
+        let (middle, most, corner) = errors(initial(SIDE, (shift.0 as f32 + 1.6, shift.1 as f32 - 1.2)));
+        println!("plain {plain:.3?}, from the start {middle:.3} {most:.3}, corner {corner:.3}");
+        assert!(plain.0 > 5.0, "the plain estimate misses it: nothing is shown");
+        assert!(middle < 0.05 && most < 0.5 && corner < 4.0);
+    }
+}
+
+#[test]
+fn a_useless_start_changes_nothing() {
+    let scene = scene(FAST);
+    let truth = mean_truth(&scene, 0.0, (0.0, 1.0)).unwrap();
+    for (options, times) in
+        [(CoarseToFineOptions::pair(), &[0.0, 1.0][..]), (CoarseToFineOptions::default(), &[-1.0, 0.0, 1.0])]
+    {
+        let frames = frames(&scene, 1.0, times);
+        let (flow, jacobian) = errors(&estimate(options.clone(), EstimatorOptions::default(), &frames), &truth);
+        for start in [(0.0, 0.0), (40.0, 40.0), (-25.0, 3.0), (f32::NAN, f32::NAN), (1e30, -1e30)] {
+            let field = estimate(options.clone(), initial(SIZE, start), &frames);
+            let found = errors(&field, &truth);
+            println!("{start:?}: {found:.4?}, without {flow:.4} {jacobian:.5}");
+            assert!(found.0 < 1.1 * flow + 0.001 && found.1 < 1.1 * jacobian + 1e-5, "{start:?} {found:?} {flow}");
+        }
+    }
 }

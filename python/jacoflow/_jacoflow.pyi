@@ -347,6 +347,17 @@ class FlowField:
         is free text kept in .npz. OSError when the file cannot be written, ValueError for another extension.
         """
     @staticmethod
+    def from_arrays(
+        flow: ArrayLike, covariance: ArrayLike | None = None, jacobian: ArrayLike | None = None
+    ) -> FlowField:
+        """The field of flow from elsewhere, px/frame: `std`, `advect`, `region_mean` and motion from flow then
+        work on it: (u, v) of shape (H, W, 2), their Jacobian (H, W, 2, 2), [[u_x, u_y], [v_x, v_y]], and the
+        covariance of (u, v), (H, W, 2, 2), or with a Jacobian of (u, v, u_x, v_x, u_y, v_y), (H, W, 6, 6).
+
+        NaN where the flow is unknown. Without a Jacobian derivatives are zero. ValueError for other shapes
+        and negative variances.
+        """
+    @staticmethod
     def load(path: _Path) -> FlowField:
         """Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError
         for a damaged file.
@@ -360,6 +371,7 @@ def estimate(
     frames: _Frames,
     *,
     method: FlowMethod | None = None,
+    initial: FlowField | ArrayLike | None = None,
     temporal: Fusion | None = None,
     covariance: bool | None = None,
     noise: float | None = None,
@@ -390,6 +402,10 @@ def estimate(
     method : "coarse_to_fine", "windowed", "instantaneous", "lucas_kanade", "horn_schunck", or options
         A name means the method with its defaults; `CoarseToFine` (default), `Windowed`,
         `Instantaneous`, `LucasKanade` and `HornSchunck` hold its options and say what it is for.
+    initial : array (H, W, 2) of (u, v), px/frame, or `FlowField` of one frame
+        Flow from elsewhere (a network, a PIV code, the frame before). "coarse_to_fine" starts from it
+        where the frames agree better with it than with their own flow, and refines it. NaN: unknown.
+        A stack starts every estimate from it.
     temporal : "none" (default), "recursive", or `Recursive`
         "recursive" fuses the estimates of all frames so far, for motion that is steady in the picture
         ("coarse_to_fine", "windowed", "instantaneous").
@@ -443,6 +459,7 @@ class FlowEstimator:
         cls,
         *,
         method: FlowMethod | None = None,
+        initial: FlowField | ArrayLike | None = None,
         temporal: Fusion | None = None,
         covariance: bool | None = None,
         noise: float | None = None,

@@ -4,7 +4,7 @@ use super::arguments::{
     ComputeArguments, GridArguments, InputArguments, MessageArguments, MethodArguments, OutputArguments,
 };
 use super::interrupt::Watch;
-use super::open::{Opened, compute, in_double, open_input, preprocess, read_mask};
+use super::open::{Opened, compute, in_double, open_input, preprocess, read_initial, read_mask};
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow};
 use crate::error::{Error, Result};
@@ -69,6 +69,7 @@ pub fn prepare(
     let common = EstimatorOptions {
         sites: places,
         mask: read_mask(grid.mask.as_deref(), opened.first.size)?,
+        initial: method.initial.as_deref().map(read_initial).transpose()?,
         pixel_pitch: method.pixel_pitch.unwrap_or((1.0, 1.0)),
         frame_period: opened.numbering.period(),
         covariance: !method.no_covariance && chosen.info().has_covariance,

@@ -2,15 +2,18 @@
 
 use super::arguments::{ComputeArguments, InputArguments};
 use crate::error::{Error, Result};
+use crate::flow::InitialFlow;
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::io::{
-    ChannelPolicy, Colour, FilesSource, FrameFormat, FrameSource, OpenOptions, Selected, open, open_colour, read_image,
+    ChannelPolicy, Colour, FilesSource, FrameFormat, FrameSource, OpenOptions, Selected, open, open_colour, read_flo,
+    read_image, read_kitti,
 };
 use crate::parallel::Threads;
 use crate::pipeline::{FirstFrame, Numbering, peek};
 use crate::simd::Level;
 use crate::types::{AnyColourFrame, AnyFrame, Frame, Mask, Precision};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A source that is ready, with its first frame looked at.
 pub struct Opened<F = AnyFrame> {
@@ -91,6 +94,13 @@ pub fn compute(arguments: &ComputeArguments) -> Result<(Threads, Option<Level>)>
 /// Whether to compute in double precision for frames of this type: by default if `demanding`.
 pub fn in_double(precision: Precision, first: &FirstFrame, demanding: bool) -> bool {
     (demanding && precision == Precision::Auto) || precision.is_double(first.dtype)
+}
+
+/// The flow that an estimate starts from: KITTI's format for .png, else .flo.
+pub fn read_initial(path: &Path) -> Result<Arc<InitialFlow>> {
+    let is_png = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png"));
+    let image = if is_png { read_kitti(path)? } else { read_flo(path)? };
+    Ok(Arc::new(InitialFlow::new((image.width(), image.height()), image.u(), image.v())?))
 }
 
 /// Reads a mask: pixels that are not black may be used.

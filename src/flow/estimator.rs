@@ -53,6 +53,9 @@ impl Estimator {
     /// [`Error::Argument`] naming the option that cannot be used.
     pub fn new(method: Method, options: EstimatorOptions) -> Result<Self> {
         options.check()?;
+        if options.initial.is_some() && !method.info().takes_initial {
+            return Err(Error::argument("initial", "method coarse_to_fine", method.name()));
+        }
         let engine = match &method {
             Method::CoarseToFine(o) => Engine::CoarseToFine(CoarseToFine::new(o)?),
             Method::Instantaneous(o) => Engine::Instantaneous(Box::new(Instantaneous::new(o, &options)?)),
@@ -173,6 +176,10 @@ impl Estimator {
         if let Some(mask) = self.options.mask.as_ref().filter(|m| m.size() != (w, h)) {
             let got = format!("{} x {}", mask.width(), mask.height());
             return Err(Error::argument("mask", format!("the size of the frames, {w} x {h}"), got));
+        }
+        if let Some(initial) = self.options.initial.as_ref().filter(|i| [i.u.size(), i.v.size()] != [(w, h); 2]) {
+            let got = format!("{} x {}", initial.u.width(), initial.u.height());
+            return Err(Error::argument("initial", format!("a flow of the frames' size, {w} x {h}"), got));
         }
         if let Some(noise) =
             self.options.noise.filter(|noise| *noise > MAX_SINGLE_NOISE && size_of::<T>() == size_of::<f32>())

@@ -59,6 +59,8 @@ pub struct MethodInfo {
     pub has_systematic: bool,
     /// Whether it chooses the window of the derivatives at each pixel.
     pub chooses_window: bool,
+    /// Whether it can start from a given flow.
+    pub takes_initial: bool,
 }
 
 const USUAL: MethodInfo = MethodInfo {
@@ -71,6 +73,7 @@ const USUAL: MethodInfo = MethodInfo {
     has_covariance: true,
     has_systematic: false,
     chooses_window: false,
+    takes_initial: false,
 };
 
 /// Every method, the recommended one first.
@@ -82,6 +85,7 @@ pub const METHODS: &[MethodInfo] = &[
         time_schemes: &["forward", "central", PAIR],
         has_systematic: true,
         chooses_window: true,
+        takes_initial: true,
         ..USUAL
     },
     MethodInfo {

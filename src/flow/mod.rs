@@ -40,4 +40,4 @@ pub use advect::{Advected, PointCovariance, advect};
 pub use estimator::Estimator;
 pub use methods::{METHODS, Method, MethodInfo, MethodSettings, PAIR};
 pub use observability::{Condition, Observability, ObservabilityMap, classify, observability};
-pub use options::{EstimatorOptions, RankPolicy};
+pub use options::{EstimatorOptions, InitialFlow, RankPolicy};

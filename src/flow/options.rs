@@ -3,7 +3,8 @@
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{Mask, SamplingGrid};
+use crate::types::{Frame, Mask, SamplingGrid};
+use std::sync::Arc;
 
 /// Report where the equations do not determine every unknown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -37,6 +38,26 @@ impl RankPolicy {
     }
 }
 
+/// A flow from elsewhere that an estimate starts from, px/frame; NaN where it is unknown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InitialFlow {
+    /// Along x, of the frames' size.
+    pub u: Frame<f32>,
+    /// Along y.
+    pub v: Frame<f32>,
+}
+
+impl InitialFlow {
+    /// From row-major planes of a frame of `size = (width, height)`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] for planes of another size.
+    pub fn new((width, height): (usize, usize), u: &[f32], v: &[f32]) -> Result<Self> {
+        let frame = |plane: &[f32]| Frame::new(width, height, plane.to_vec());
+        Ok(Self { u: frame(u)?, v: frame(v)? })
+    }
+}
+
 /// Options that all methods share.
 #[derive(Debug, Clone)]
 pub struct EstimatorOptions {
@@ -44,6 +65,9 @@ pub struct EstimatorOptions {
     pub sites: SamplingGrid,
     /// Pixels that may be used (`true`), of the frames' size. Default: all.
     pub mask: Option<Mask>,
+    /// Flow that competes with the one that the frames alone give, for methods that start from one
+    /// ([`MethodInfo::takes_initial`](super::MethodInfo)). Default: none.
+    pub initial: Option<Arc<InitialFlow>>,
     /// Physical size `(dx, dy)` of a pixel; flow comes in these units per frame. Default: 1 px.
     pub pixel_pitch: (f64, f64),
     /// Seconds between frames, kept with the result for quantities per second. Default: unknown.
@@ -68,6 +92,7 @@ impl Default for EstimatorOptions {
         Self {
             sites: SamplingGrid::default(),
             mask: None,
+            initial: None,
             pixel_pitch: (1.0, 1.0),
             frame_period: None,
             covariance: false,

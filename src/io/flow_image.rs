@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::types::{FieldLayout, FlowField, SamplingGrid, Status};
+use crate::types::{FlowField, SamplingGrid};
 
 /// Flow `(u, v)` of every pixel of a grid, px/frame; NaN where it is unknown.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,24 +54,9 @@ impl FlowImage {
     /// As a translational field: every pixel a site, status `Unobservable` where the flow is unknown.
     ///
     /// # Errors
-    /// None for a well-formed image; passes on what [`FlowField::empty`] reports.
+    /// None for a well-formed image; passes on what [`FlowField::from_planes`] reports.
     pub fn to_field(&self) -> Result<FlowField<f32>> {
-        let layout = FieldLayout {
-            frame_size: (self.width, self.height),
-            sites: SamplingGrid::default(),
-            model: "translational".into(),
-            parameters: vec!["u".into(), "v".into()],
-            frame_period: None,
-            pixel_pitch: (1.0, 1.0),
-            frame_index: 0,
-            correlation_length: 0.0,
-        };
-        let mut field = FlowField::empty(layout, false)?;
-        field.motion = [self.u.as_slice(), &self.v].concat();
-        for (status, (u, v)) in field.status.iter_mut().zip(self.u.iter().zip(&self.v)) {
-            *status = if u.is_finite() && v.is_finite() { Status::Ok } else { Status::Unobservable };
-        }
-        Ok(field)
+        FlowField::from_planes((self.width, self.height), [self.u.as_slice(), &self.v].concat(), None)
     }
 
     /// Columns.

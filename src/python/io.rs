@@ -10,11 +10,21 @@ use crate::io::{
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// A flow array `(H, W, 2)` as a flow image.
-fn flow_image(flow: &Bound<'_, PyAny>) -> PyResult<FlowImage> {
-    let (shape, values) = arrays::doubles("flow", flow)?;
+/// A flow array `(H, W, 2)`, or a single field, as a flow image.
+pub fn flow_image(argument: &'static str, flow: &Bound<'_, PyAny>) -> PyResult<FlowImage> {
+    if let Ok(field) = flow.cast::<FlowField>() {
+        let field = field.get();
+        if field.count().1 {
+            return Err(Error::argument(argument, "one field", "a stack of fields").into());
+        }
+        return Ok(match field.store() {
+            Store::Single(packed) => FlowImage::from_field(&field.core(packed, 0))?,
+            Store::Double(packed) => FlowImage::from_field(&field.core(packed, 0))?,
+        });
+    }
+    let (shape, values) = arrays::doubles(argument, flow)?;
     let [height, width, 2] = shape[..] else {
-        return Err(Error::argument("flow", "shape (H, W, 2)", format!("shape {shape:?}")).into());
+        return Err(Error::argument(argument, "shape (H, W, 2)", format!("shape {shape:?}")).into());
     };
     let plane = |k: usize| values.iter().skip(k).step_by(2).map(|&v| v as f32).collect();
     Ok(FlowImage::new(width, height, plane(0), plane(1))?)
@@ -38,7 +48,7 @@ pub fn read_flow<'py>(py: Python<'py>, path: PathBuf, format: &str) -> PyResult<
 /// Writes flow in one of the exchange formats.
 #[pyfunction(name = "_write_flow")]
 pub fn write_flow(py: Python<'_>, path: PathBuf, flow: &Bound<'_, PyAny>, format: &str) -> PyResult<()> {
-    let flow = flow_image(flow)?;
+    let flow = flow_image("flow", flow)?;
     Ok(py.detach(|| match format {
         "kitti" => write_kitti(&path, &flow),
         _ => write_flo(&path, &flow),

@@ -1,7 +1,7 @@
 //! The result of an estimator: planes of motion parameters, their covariance and their status.
 
-use super::{AffineFlow, SamplingGrid, Status};
-use crate::error::Result;
+use super::{AffineFlow, MOTION_NAMES, SamplingGrid, Status};
+use crate::error::{Error, Result};
 use crate::math::Real;
 
 /// What a field holds at each site and where the sites are.
@@ -59,6 +59,51 @@ pub struct FlowField<T> {
 }
 
 impl<T: Real> FlowField<T> {
+    /// A field at every pixel of a frame of `size = (width, height)` from given planes: `u, v`, or all of
+    /// `MOTION_NAMES`, and the upper triangle of their covariance, in px and frames. Status `Unobservable`
+    /// where a plane is not finite.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `motion` or `covariance` for another number of values, or a negative
+    /// variance.
+    pub fn from_planes(size: (usize, usize), motion: Vec<T>, covariance: Option<Vec<T>>) -> Result<Self> {
+        let (n, count) = (size.0 * size.1, motion.len());
+        let (model, p) = if count == 2 * n { ("translational", 2) } else { ("affine", MOTION_NAMES.len()) };
+        if count != p * n {
+            return Err(Error::argument("motion", format!("2 or 6 planes of {n} values"), format!("{count} values")));
+        }
+        let layout = FieldLayout {
+            frame_size: size,
+            sites: SamplingGrid::default(),
+            model: model.into(),
+            parameters: MOTION_NAMES[..p].iter().map(|&name| name.into()).collect(),
+            frame_period: None,
+            pixel_pitch: (1.0, 1.0),
+            frame_index: 0,
+            correlation_length: 0.0,
+        };
+        let mut field = Self::empty(layout, false)?;
+        if let Some(planes) = &covariance {
+            let (entries, found) = (p * (p + 1) / 2 * n, planes.len());
+            // Row k of the upper triangle begins with a variance.
+            let is_negative = |k: usize| {
+                let plane = k * p - k * k.saturating_sub(1) / 2;
+                planes[plane * n..(plane + 1) * n].iter().any(|v| v.to_f64() < 0.0)
+            };
+            if found != entries || (0..p).any(is_negative) {
+                let expected = format!("{entries} values, variances of at least 0");
+                let got = if found == entries { "a negative variance".into() } else { format!("{found} values") };
+                return Err(Error::argument("covariance", expected, got));
+            }
+        }
+        for (site, status) in field.status.iter_mut().enumerate() {
+            let is_known = (0..p).all(|k| motion[k * n + site].finite());
+            *status = if is_known { Status::Ok } else { Status::Unobservable };
+        }
+        (field.motion, field.covariance) = (motion, covariance);
+        Ok(field)
+    }
+
     /// A field of NaN with status `Border`, to be filled by an estimator.
     pub fn empty(layout: FieldLayout, covariance: bool) -> Result<Self> {
         Self::of(layout, covariance, T::nan())

@@ -7,6 +7,7 @@ use crate::jet::Neighbourhood;
 use crate::temporal::RecursiveOptions;
 use clap::Args;
 use serde_json::{Value, json};
+use std::path::PathBuf;
 
 /// Estimator options, as [`MethodSettings`] has them.
 #[derive(Debug, Clone, Args)]
@@ -23,6 +24,9 @@ pub struct MethodArguments {
     /// coarse-to-fine: pyramid levels [default: as many as the frame allows]
     #[arg(long, value_name = "N")]
     pub levels: Option<usize>,
+    /// coarse-to-fine: flow from elsewhere to start from, .flo or .png (KITTI) of the frames' size, px/frame
+    #[arg(long, value_name = "FILE")]
+    pub initial: Option<PathBuf>,
     /// instantaneous: motion model, affine (default), translational or accelerating
     #[arg(long, value_name = "NAME")]
     pub model: Option<String>,
@@ -117,6 +121,7 @@ impl MethodArguments {
         let recursive = self.recursive().ok().flatten();
         json!({
             "method": method.name(), "options": format!("{method:?}"), "noise": self.noise,
+            "initial": self.initial,
             "forgetting": recursive.map(|options| options.forgetting),
         })
     }

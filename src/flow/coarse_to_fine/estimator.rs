@@ -13,7 +13,7 @@ use super::refine::{RefineOptions, WindowStatistics, refine};
 use super::schedule::Schedule;
 use super::workspace::{Workspace, WorkspaceStore};
 use crate::error::Result;
-use crate::flow::options::EstimatorOptions;
+use crate::flow::options::{EstimatorOptions, InitialFlow};
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame};
 
@@ -53,7 +53,8 @@ impl CoarseToFine {
             let levels = (self.options.levels, schedule.finest_level);
             let finest = workspace.pyramid.fill(simd, frames, brightness, common.mask.as_ref(), levels);
             let plan = DescentPlan { simd, schedule, brightness, finest, keeps_levels: field.covariance.is_some() };
-            let mut estimate = estimate(&plan, frames.len() == 3, self.options.central, &mut workspace);
+            let initial = common.initial.as_deref();
+            let mut estimate = estimate(&plan, (frames.len() == 3, self.options.central), initial, &mut workspace);
             let covariance_of = covariance_of(&mut estimate, &mut workspace, (frames, common), field);
             output::fill((&estimate, covariance_of), &workspace.space, frames, common, field);
             estimate.recycle(&workspace);
@@ -87,12 +88,15 @@ fn covariance_of<T: SimdReal>(
 
 fn estimate<T: SimdReal>(
     plan: &DescentPlan,
-    is_triple: bool,
-    central: bool,
+    (is_triple, central): (bool, bool),
+    initial: Option<&InitialFlow>,
     workspace: &mut Workspace<T>,
 ) -> Estimate<T> {
     let simd = plan.simd;
-    let mut found = plan.estimate_all_levels(workspace);
+    let mut found = match initial {
+        Some(given) => plan.estimate_from(workspace, given, !is_triple),
+        None => plan.estimate_all_levels(workspace),
+    };
     let (mut motion, mut statistics) =
         refine(simd, &workspace.space, &RefineOptions::default(), &found.motion, &found.data);
     if is_triple {

@@ -1,12 +1,14 @@
 //! The options of `estimate` and `FlowEstimator`, and the core's options that they mean.
 
-use crate::flow::{Estimator, EstimatorOptions, METHODS, Method, MethodInfo, MethodSettings, PAIR};
+use crate::flow::{Estimator, EstimatorOptions, InitialFlow, METHODS, Method, MethodInfo, MethodSettings, PAIR};
 use crate::python::arrays;
 use crate::python::image::renamed;
+use crate::python::io::flow_image;
 use crate::python::keywords::{keep_options, with_common};
 use crate::python::options::{self, Group, Integer, Object, PreprocessOptions};
 use crate::temporal::{AnyFlowStream, RecursiveOptions, StreamPlan};
 use pyo3::prelude::*;
+use std::sync::Arc;
 
 /// Hands the options of an estimator to `$then!`.
 macro_rules! estimator_options {
@@ -14,6 +16,7 @@ macro_rules! estimator_options {
         with_common! {
             $then $target
             method: Object as Object = None,
+            initial: Object as Object = None,
             temporal: Object as Object = None,
             covariance: Option<bool> as Option<bool> = None,
             noise: Option<f64> as Option<f64> = None,
@@ -32,7 +35,8 @@ const _: () = assert!(METHOD_CLASSES.len() == METHODS.len());
 impl Arguments {
     /// With copies of the arrays, safe from later changes.
     pub fn keep(mut self, py: Python<'_>) -> PyResult<Self> {
-        for object in [&mut self.method, &mut self.temporal, &mut self.grid, &mut self.mask, &mut self.preprocess] {
+        let [grid, mask, preprocess] = [&mut self.grid, &mut self.mask, &mut self.preprocess];
+        for object in [&mut self.method, &mut self.initial, &mut self.temporal, grid, mask, preprocess] {
             *object = options::keep(py, object.take())?;
         }
         Ok(self)
@@ -103,6 +107,7 @@ impl Arguments {
         Ok(EstimatorOptions {
             sites: options::grid(py, &self.grid)?,
             mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
+            initial: self.initial.as_ref().map(|flow| initial(flow.bind(py))).transpose()?,
             pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(default.pixel_pitch),
             frame_period: options::frame_period(self.fps)?,
             covariance: self.covariance.unwrap_or(method.info().has_covariance),
@@ -113,4 +118,10 @@ impl Arguments {
             simd: options::simd(self.simd.as_deref())?,
         })
     }
+}
+
+/// The flow that an estimate starts from.
+fn initial(flow: &Bound<'_, PyAny>) -> PyResult<Arc<InitialFlow>> {
+    let image = flow_image("initial", flow)?;
+    Ok(Arc::new(InitialFlow::new((image.width(), image.height()), image.u(), image.v())?))
 }

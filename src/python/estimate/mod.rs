@@ -94,6 +94,10 @@ macro_rules! define_estimate {
         /// method : "coarse_to_fine", "windowed", "instantaneous", "lucas_kanade", "horn_schunck", or options
         ///     A name means the method with its defaults; `CoarseToFine` (default), `Windowed`,
         ///     `Instantaneous`, `LucasKanade` and `HornSchunck` hold its options and say what it is for.
+        /// initial : array (H, W, 2) of (u, v), px/frame, or `FlowField` of one frame
+        ///     Flow from elsewhere (a network, a PIV code, the frame before). "coarse_to_fine" starts from it
+        ///     where the frames agree better with it than with their own flow, and refines it. NaN: unknown.
+        ///     A stack starts every estimate from it.
         /// temporal : "none" (default), "recursive", or `Recursive`
         ///     "recursive" fuses the estimates of all frames so far, for motion that is steady in the picture
         ///     ("coarse_to_fine", "windowed", "instantaneous").

@@ -125,6 +125,22 @@ impl FlowField {
         io::save_field(py, self, &path, options)
     }
 
+    /// The field of flow from elsewhere, px/frame: `std`, `advect`, `region_mean` and motion from flow then
+    /// work on it: (u, v) of shape (H, W, 2), their Jacobian (H, W, 2, 2), [[u_x, u_y], [v_x, v_y]], and the
+    /// covariance of (u, v), (H, W, 2, 2), or with a Jacobian of (u, v, u_x, v_x, u_y, v_y), (H, W, 6, 6).
+    ///
+    /// NaN where the flow is unknown. Without a Jacobian derivatives are zero. ValueError for other shapes
+    /// and negative variances.
+    #[staticmethod]
+    #[pyo3(signature = (flow, covariance = None, jacobian = None))]
+    fn from_arrays(
+        flow: &Bound<'_, PyAny>,
+        covariance: Option<&Bound<'_, PyAny>>,
+        jacobian: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        state::from_arrays(flow, covariance, jacobian)
+    }
+
     /// Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError
     /// for a damaged file.
     #[staticmethod]

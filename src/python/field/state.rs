@@ -105,6 +105,38 @@ fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> PyResult<FlowField> {
     Ok(FlowField { store: T::store(packed), start: 0, count, stack })
 }
 
+/// A field of arrays from elsewhere.
+pub fn from_arrays(
+    flow: &Bound<'_, PyAny>,
+    covariance: Option<&Bound<'_, PyAny>>,
+    jacobian: Option<&Bound<'_, PyAny>>,
+) -> PyResult<FlowField> {
+    let (shape, values) = arrays::doubles("flow", flow)?;
+    let [height, width, 2] = shape[..] else {
+        return Err(Error::argument("flow", "shape (H, W, 2)", format!("shape {shape:?}")).into());
+    };
+    // Plane k holds every `tail`-th value of an array from its `at`-th on.
+    let planes = |values: &[f64], tail: usize, places: &[usize]| -> Vec<f64> {
+        places.iter().flat_map(|&at| values.iter().skip(at).step_by(tail).copied()).collect()
+    };
+    let matrices = |name: &'static str, object: &Bound<'_, PyAny>, side: usize, places: &[usize]| {
+        let (shape, values) = arrays::doubles(name, object)?;
+        if shape != [height, width, side, side] {
+            let expected = format!("shape ({height}, {width}, {side}, {side})");
+            return Err(PyErr::from(Error::argument(name, expected, format!("shape {shape:?}"))));
+        }
+        Ok(planes(&values, side * side, places))
+    };
+    let mut motion = planes(&values, 2, &[0, 1]);
+    if let Some(jacobian) = jacobian {
+        motion.extend(matrices("jacobian", jacobian, 2, &[0, 2, 1, 3])?);
+    }
+    let side = if jacobian.is_some() { 6 } else { 2 };
+    let upper: Vec<usize> = (0..side).flat_map(|i| (i..side).map(move |j| i * side + j)).collect();
+    let covariance = covariance.map(|object| matrices("covariance", object, side, &upper)).transpose()?;
+    Ok(FlowField::single(crate::types::FlowField::from_planes((width, height), motion, covariance)?))
+}
+
 fn missing(name: &str) -> PyErr {
     Error::argument("state", format!("the entry {name:?}"), "none").into()
 }

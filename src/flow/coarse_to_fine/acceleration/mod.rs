@@ -75,7 +75,8 @@ pub(super) fn to_middle_frame<T: SimdReal>(
         chosen.into_iter().flat_map(WindowStatistics::into_planes).for_each(|planes| space.keep(planes));
         workspace.release_to_system_if_large();
         let level = &pyramid.levels()[finest];
-        Comparison { simd, level, compared: ComparedFrames::Ahead, residual_std, pool, space }
+        let (compared, follows_majority) = (ComparedFrames::Ahead, false);
+        Comparison { simd, level, compared, residual_std, follows_majority, pool, space }
             .replace_where_better(motion, &own, 0.0);
         space.keep(own);
     }

@@ -19,6 +19,8 @@ pub(in crate::flow::coarse_to_fine) struct Comparison<'a, T> {
     pub compared: ComparedFrames,
     /// Standard deviation of the residual, grey levels.
     pub residual_std: Option<T>,
+    /// Whether sites that cannot be compared along `other` take it if most of the others do.
+    pub follows_majority: bool,
     pub pool: &'a Pool<T>,
     pub space: &'a PlanePool<T>,
 }
@@ -39,7 +41,11 @@ impl<T: SimdReal> Comparison<'_, T> {
         // Comparisons with NaN are false.
         let better =
             |n: usize| MIN_ENERGY_RATIO * (found[n] + typical) < known[n] + typical && distance(n) > min_distance;
-        let wins: Vec<bool> = (0..known.len()).map(better).collect();
+        let mut wins: Vec<bool> = (0..known.len()).map(better).collect();
+        let compared = known.iter().zip(&found).filter(|(a, b)| !a.is_nan() && !b.is_nan()).count();
+        if self.follows_majority && 2 * wins.iter().filter(|&&win| win).count() > compared {
+            wins.iter_mut().zip(&found).for_each(|(win, energy)| *win |= energy.is_nan());
+        }
         if !wins.contains(&true) {
             return false;
         }

@@ -29,7 +29,7 @@ const BORDER_DIVISOR: usize = 16;
 const TRIAL: (usize, Smoothness) =
     (3, Smoothness { flow: 1.0, jacobian: 100.0, break_strain: 0.1, sweeps: 4, reweight_every: 2 });
 /// Minimum distance, px of the level, of the trial's motion from the regularised one.
-const MIN_MOTION_DIFFERENCE: f64 = 0.5;
+pub(super) const MIN_MOTION_DIFFERENCE: f64 = 0.5;
 /// Minimum change in the first iteration of the trial, px of the level: else no site leaves its motion.
 const MIN_TRIAL_CHANGE: f64 = 0.25;
 /// Regularised iterations after both motions are combined.
@@ -83,8 +83,8 @@ impl<T: SimdReal> Iteration<'_, T> {
         if moving((motion, &trial), MIN_TRIAL_CHANGE, (0..motion.width, 0..motion.height)) > 0 {
             self.repeat(TRIAL.0 - 1, level, &TRIAL.1, (&mut trial, old));
             let DescentPlan { simd, .. } = *self.plan;
-            let comparison =
-                Comparison { simd, level, compared: self.compared, residual_std: self.residual_std, pool, space };
+            let (compared, residual_std) = (self.compared, self.residual_std);
+            let comparison = Comparison { simd, level, compared, residual_std, follows_majority: false, pool, space };
             if comparison.replace_where_better(motion, &trial, MIN_MOTION_DIFFERENCE) {
                 self.repeat(JOINT_ITERATIONS, level, smoothness, (motion, old));
             }

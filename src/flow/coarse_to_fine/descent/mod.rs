@@ -1,16 +1,18 @@
 //! Descent through the pyramid: iterations on each level, from the coarsest to the finest.
 //!
 //! `iteration` is one linearisation with its regularised solution, and the unregularised trial; `comparison`
-//! takes the better of two motions at each site; `intermediate` refines a level before the next one.
+//! takes the better of two motions at each site; `intermediate` refines a level before the next one; `given`
+//! lets a flow from elsewhere compete.
 
 pub(super) mod comparison;
+mod given;
 mod intermediate;
 mod iteration;
 
 use super::brightness_scale::BrightnessScale;
 use super::data_term::{COUNT, DataOptions, DataTerm, MOTION, summary};
 use super::planes::Planes;
-use super::pyramid::ComparedFrames;
+use super::pyramid::{ComparedFrames, PyramidLevel};
 use super::resample::{coarser, finer};
 use super::schedule::{LevelSchedule, Schedule};
 use super::workspace::Workspace;
@@ -44,14 +46,23 @@ pub(super) struct DescentResult<T> {
 impl DescentPlan {
     /// Descends from the coarsest level of the filled pyramid, starting without motion.
     pub fn estimate_all_levels<T: SimdReal>(&self, workspace: &mut Workspace<T>) -> DescentResult<T> {
-        let levels = workspace.pyramid.levels();
-        let coarsest = levels.len() - 1;
-        let site_counts = site_counts(levels[coarsest].size);
-        let schedules: Vec<_> =
-            (0..levels.len()).map(|k| self.schedule.on_level(k, levels[k].size, k == coarsest)).collect();
-        let mut motion = workspace.space.planes(site_counts.0, site_counts.1, MOTION);
+        let schedules = self.schedules(workspace.pyramid.levels());
+        let rest = Self::at_rest(workspace);
+        self.descend(workspace, ComparedFrames::All, rest, (&schedules, self.finest))
+    }
+
+    /// The schedule of every level.
+    fn schedules<T>(&self, levels: &[PyramidLevel<T>]) -> Vec<LevelSchedule> {
+        let count = levels.len();
+        levels.iter().enumerate().map(|(k, level)| self.schedule.on_level(k, level.size, k + 1 == count)).collect()
+    }
+
+    /// No motion, on the coarsest level.
+    fn at_rest<T: SimdReal>(workspace: &Workspace<T>) -> Planes<T> {
+        let (width, height) = workspace.pyramid.levels().last().map_or((0, 0), |level| site_counts(level.size));
+        let mut motion = workspace.space.planes(width, height, MOTION);
         motion.data_mut().fill(T::from_f64(0.0));
-        self.descend(workspace, ComparedFrames::All, motion, (&schedules, self.finest))
+        motion
     }
 
     /// Repeats the finest level about a better `motion`.
@@ -88,8 +99,7 @@ impl DescentPlan {
     fn replace_from_next_frame<T: SimdReal>(&self, workspace: &mut Workspace<T>, level: usize, motion: &mut Planes<T>) {
         let levels = workspace.pyramid.levels();
         let coarsest = levels.len() - 1;
-        let schedules: Vec<_> =
-            (0..=coarsest).map(|k| self.schedule.on_level(k, levels[k].size, k == coarsest)).collect();
+        let schedules = self.schedules(levels);
         let start = coarsened(workspace, motion, level..=coarsest);
         let DescentResult { motion: coarser_motions, data, residual_std, .. } =
             self.without_levels().descend(workspace, ComparedFrames::Ahead, start, (&schedules, level + 1));
@@ -97,8 +107,8 @@ impl DescentPlan {
         let level = &pyramid.levels()[level];
         let mut own = space.planes(0, 0, MOTION);
         finer(self.simd, &coarser_motions, level.size, &mut own);
-        let comparison =
-            Comparison { simd: self.simd, level, compared: ComparedFrames::Ahead, residual_std, pool, space };
+        let (simd, compared, follows_majority) = (self.simd, ComparedFrames::Ahead, false);
+        let comparison = Comparison { simd, level, compared, residual_std, follows_majority, pool, space };
         comparison.replace_where_better(motion, &own, 0.0);
         for planes in [coarser_motions, data, own] {
             space.keep(planes);
