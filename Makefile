@@ -10,7 +10,8 @@ CHECKED := --config profile.ci.package.jacoflow.overflow-checks=true --config pr
 
 .PHONY: test demo format clippy features rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare readme ablation clean
 
-test: format clippy features rustdoc rust-test guide pytest stubtest typing examples
+test: format clippy features rustdoc rust-test guide pytest
+	@$(MAKE) --no-print-directory -j2 -o install stubtest typing examples
 	@echo "everything passed"
 
 # The main job on an embedded example.
@@ -33,8 +34,11 @@ features:
 rustdoc:
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q $(CI) --no-deps
 
+# Unit tests have a library of their own, which takes longer to optimise than to run as it is.
 rust-test:
-	cargo test $(CI) $(CHECKED) --features reference
+	cargo test $(CI) $(CHECKED) --features reference --test '*'
+	cargo test $(CI) $(CHECKED) --features reference --doc
+	cargo test $(CI) $(CHECKED) --features reference --lib --config profile.ci.package.jacoflow.opt-level=0
 
 # The page that tells how to add a motion model, followed to the letter in a copy.
 guide:
