@@ -38,9 +38,9 @@ VARIANTS: dict[str, list[str]] = {
 ESTIMATE = """
 import time, numpy, jacoflow
 frames = jacoflow.scenes.Scene("vortex", width=320, height=240, random_state=1).frames(3)
-jacoflow.estimate(frames[:2])
+jacoflow.estimate(frames)
 start = time.perf_counter()
-jacoflow.estimate(frames[:2])
+jacoflow.estimate(frames)
 print(time.perf_counter() - start)
 """
 
