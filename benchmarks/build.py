@@ -3,10 +3,10 @@ the profile.
 
     python -m benchmarks.build [--variants ci thin ...] [--repeats 7]
 
-Every variant compiles the extension and all it depends on from nothing in a folder of its own, so that it takes
-minutes and a gigabyte each; the folders are deleted. Columns: seconds on the clock and of all threads; size of
-the module, stripped as in the wheel, MB; time of one flow estimate over that of the first variant. The variants
-take turns, and the least time of each counts. Needs cargo, `strip` and numpy.
+Every variant compiles the extension and all it depends on from nothing in a folder of its own, so that it
+takes minutes and a gigabyte each; the folders are deleted. Columns: seconds on the clock and of all threads;
+size of the module, stripped as in the wheel, MB; time of one flow estimate over that of the first variant.
+The variants take turns, and the least time of each counts. Needs cargo, `strip` and numpy.
 """
 
 from __future__ import annotations
