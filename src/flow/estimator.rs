@@ -3,6 +3,7 @@
 use super::baseline::{HornSchunck, LucasKanade};
 use super::coarse_to_fine::CoarseToFine;
 use super::instantaneous::Instantaneous;
+use super::intake::Intake;
 use super::methods::Method;
 use super::model::{ModelKind, Parameter};
 use super::options::EstimatorOptions;
@@ -212,8 +213,25 @@ impl Estimator {
     }
 
     fn fill_with<T: SimdReal>(&self, frames: &[&Frame<T>], field: &mut FlowField<T>) -> Result<()> {
+        let Some(Intake { frames, gain }) = Intake::of(frames, self.options.mask.as_ref()) else {
+            return self.fill_from(frames, &self.options, field);
+        };
+        let options = EstimatorOptions { noise: self.options.noise.map(|noise| gain * noise), ..self.options.clone() };
+        self.fill_from(&frames.iter().collect::<Vec<_>>(), &options, field)?;
+        for value in field.residual.iter_mut().flatten().filter(|_| gain != 1.0) {
+            *value = T::from_f64(value.to_f64() / gain);
+        }
+        Ok(())
+    }
+
+    fn fill_from<T: SimdReal>(
+        &self,
+        frames: &[&Frame<T>],
+        options: &EstimatorOptions,
+        field: &mut FlowField<T>,
+    ) -> Result<()> {
         let n = field.len();
-        if self.options.diagnostics {
+        if options.diagnostics {
             field.residual.get_or_insert_default().resize(n, T::nan());
             field.condition.get_or_insert_default().resize(n, T::nan());
             field.rank.get_or_insert_default().resize(n, 0);
@@ -221,12 +239,12 @@ impl Estimator {
             (field.residual, field.condition, field.rank) = (None, None, None);
         }
         let info = self.method.info();
-        field.window = (self.options.diagnostics && info.chooses_window).then(|| {
+        field.window = (options.diagnostics && info.chooses_window).then(|| {
             let mut plane = field.window.take().unwrap_or_default();
             plane.resize(n, T::nan());
             plane
         });
-        let has_systematic = self.options.covariance && self.options.systematic && info.has_systematic;
+        let has_systematic = options.covariance && options.systematic && info.has_systematic;
         let entries = field.covariance.as_ref().map_or(0, Vec::len);
         field.systematic = has_systematic.then(|| {
             let mut planes = field.systematic.take().unwrap_or_default();
@@ -234,15 +252,15 @@ impl Estimator {
             planes
         });
         match (&self.engine, frames) {
-            (Engine::Instantaneous(e), &[a, b, c]) => e.estimate_into([a, b, c], &self.options, field),
+            (Engine::Instantaneous(e), &[a, b, c]) => e.estimate_into([a, b, c], options, field),
             (Engine::Instantaneous(_), _) => {}
-            (Engine::CoarseToFine(e), _) => e.estimate_into(frames, &self.options, field),
-            (Engine::Windowed(e), _) => e.estimate_into(frames, &self.options, field),
-            (Engine::LucasKanade(e), _) => e.estimate_into(frames, &self.options, field)?,
-            (Engine::HornSchunck(e), _) => e.estimate_into(frames, &self.options, field)?,
+            (Engine::CoarseToFine(e), _) => e.estimate_into(frames, options, field),
+            (Engine::Windowed(e), _) => e.estimate_into(frames, options, field),
+            (Engine::LucasKanade(e), _) => e.estimate_into(frames, options, field)?,
+            (Engine::HornSchunck(e), _) => e.estimate_into(frames, options, field)?,
         }
-        if self.options.pixel_pitch != (1.0, 1.0) {
-            to_pitch(field, self.model().parameters(), self.options.pixel_pitch);
+        if options.pixel_pitch != (1.0, 1.0) {
+            to_pitch(field, self.model().parameters(), options.pixel_pitch);
         }
         Ok(())
     }

@@ -16,8 +16,9 @@
 //! * [`derived`]: divergence, curl, shear, rotation, time to contact, with their standard deviations.
 //! * [`advect`]: points moved by a field.
 //!
-//! `estimator` is the entry point; `methods` and `options` are its tables. What methods share: `site` (bands
-//! of sites), `moment_filter` (sums over windows), `symmetric` (6x6 matrices in lanes), `least_squares`.
+//! `estimator` is the entry point, `intake` prepares frames; `methods` and `options` are the tables. What
+//! methods share: `site` (bands of sites), `moment_filter` (sums over windows), `symmetric` (6x6 matrices in
+//! lanes), `least_squares`.
 
 mod advect;
 pub mod baseline;
@@ -25,6 +26,7 @@ pub mod coarse_to_fine;
 pub mod derived;
 mod estimator;
 pub mod instantaneous;
+mod intake;
 pub mod least_squares;
 mod methods;
 pub mod model;

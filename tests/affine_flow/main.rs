@@ -22,6 +22,7 @@ mod derived_region_motion;
 mod derived_sharing;
 mod derived_value;
 mod horn_schunck;
+mod intake;
 mod least_squares;
 mod lucas_kanade;
 mod methods;

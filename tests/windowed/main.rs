@@ -476,3 +476,31 @@ fn options_are_checked_by_name() {
     let pair = estimate(&tiny[..2], &WindowedOptions { frames: 2, ..base() }, &EstimatorOptions::default());
     assert_eq!(pair.layout.frame_index, 0);
 }
+
+#[test]
+fn a_jump_is_contradicted_and_a_small_motion_is_not() {
+    for (frames, options) in [(3, WindowedOptions::default()), (2, WindowedOptions::pair())] {
+        for (seed, motion, is_jump) in [
+            (31, [0.3, -0.2], false),
+            (32, [0.9, 0.4], false),
+            (33, [12.0, -5.0], true),
+            (34, [30.0, 20.0], true),
+            (35, [80.0, -3.0], true),
+        ] {
+            let [u, v] = motion;
+            let noises = texture((96, 96), [u, v, 0.002, 0.004, -0.004, 0.002], seed, &[-1.0, 0.0, 1.0][..frames]);
+            let camera = Sensor::eight_bit(2.0, seed);
+            let noisy: Vec<Frame<f64>> = noises.iter().zip(0..).map(|(f, t)| camera.apply(f, t)).collect();
+            let common = EstimatorOptions { covariance: true, ..EstimatorOptions::default() };
+            let estimator = Estimator::new(Method::Windowed(options.clone()), common).unwrap();
+            let field = estimator.estimate(&noisy.iter().collect::<Vec<_>>(), 0).unwrap();
+            let known: Vec<Status> = field.status.iter().copied().filter(|status| status.is_valid()).collect();
+            let contradicted = known.iter().filter(|&&status| status == Status::Inconsistent).count();
+            let share = contradicted as f64 / known.len() as f64;
+            println!("{frames} frames, {motion:?}: {share:.3} inconsistent");
+            assert!(if is_jump { share > 0.9 } else { share < 0.001 }, "{frames} {motion:?}: {share}");
+            let is_kept = |site: usize| field.motion[site].is_finite() || field.status[site] != Status::Inconsistent;
+            assert!((0..field.len()).all(is_kept));
+        }
+    }
+}

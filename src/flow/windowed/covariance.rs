@@ -1,16 +1,10 @@
-//! Covariance of the windowed estimate: what pixel noise does to it, and its bias.
+//! Covariance of the windowed estimate: what pixel noise does to it, and its bias (`docs/local_flow.md`).
 //!
-//! **Noise.** The covariance of the noise is `s2 N^-1 S N^-1` with S from [`super::scores`].
+//! **Noise.** `s2 N^-1 S N^-1` with S from [`super::scores`]. Unless it is given, `s2` is the second
+//! residual's sum of squares over its expectation; motion boundaries and changes of lighting raise it.
 //!
-//! **Bias.** A second estimate is of what motion is left in frames carried along the first one: what
-//! truncation and noise in the coefficients do to the first. A third one is of one frame alone, with the
-//! motion of each pixel: what windows make of the field of estimates. Its difference k to the first shows
-//! flow that is not affine. Carried frames lack the motion of each pixel, not that of the window: the bias of
-//! the equations is the second estimate plus k, added as an outer product. Beyond what noise makes of it, k
-//! inflates the whole covariance. Both are of rows 1 to 6.
-//!
-//! **The noise's variance**, unless it is given, is the sum of squares of the second residual over its
-//! expectation. Motion boundaries and changes of lighting raise it.
+//! **Bias.** The second estimate is of frames carried along the first, the third of one frame alone with the
+//! motion of each pixel: its difference k to the first shows flow that is not affine. Both are of rows 1-6.
 //!
 //! **Where noise passes for structure** it adds E to N on average, so that along an eigenvector of `N^-1 E`
 //! with eigenvalue a the estimate is `1 - a` of the motion. Along an edge or a grating a is near 1 and the
@@ -34,8 +28,7 @@ const MIN_SIGNAL_SHARE: f64 = 1e-2;
 /// What fits take of the noise in the second residual, in units of `tr(N^-1 S)`: 1 by its own and the rest by
 /// those of each pixel. With this value noise that is given and noise from the frames agree.
 const FITTED_TRACES: f64 = 1.6;
-/// Smallest share of the residual's expectation that the fit leaves. With 0.05 more than half of the sites in
-/// the corners of a frame had deviations above 5 px.
+/// Smallest share of the residual's expectation that the fit leaves; with 0.05 sites in corners are too sure.
 const MIN_RESIDUAL_SHARE: f64 = 0.35;
 /// Smallest share of the window on usable pixels for the noise in its equations to be that of a whole window.
 const MIN_WHOLE_WEIGHT: f64 = 0.75;

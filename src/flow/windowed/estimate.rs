@@ -12,8 +12,7 @@ use crate::types::{Frame, Status};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Smallest share of a (squared) column that is independent of the others where an unknown counts as
-/// determined.
+/// Smallest share of a squared column that the others leave independent where its unknown is determined.
 const RANK_TOLERANCE: f64 = 1e-5;
 /// Smallest share of the window's weight on usable pixels.
 const MIN_WEIGHT: f64 = 0.1;
@@ -21,6 +20,10 @@ const MIN_WEIGHT: f64 = 0.1;
 const ROUNDING_STEPS: f64 = 8.0;
 /// Samples are not carried farther than this, px: beyond it one window without a pyramid has failed.
 const MAX_CARRY: f64 = 4.0;
+/// Frames contradict a motion that leaves more than this share of their differences (jumps leave 0.4 to 0.99)
+const MAX_LEFT: f64 = 0.4;
+/// if these are as large as of a motion of so many px (jumps: 3 and more, noise: up to 1.5).
+const MIN_CONTRADICTION: f64 = 2.5;
 /// How far from a site samples can come from, px: with the pixels of the interpolation.
 pub(super) const CARRY_REACH: usize = MAX_CARRY as usize + 2;
 
@@ -226,6 +229,11 @@ impl<T: SimdReal> Task<'_, T> {
                     }
                     set(RESIDUAL, Lanes::max(residual, T::default()));
                 }
+            }
+            let differences = sums.row(plan.base(plan.energy()), g)[c].to_f64();
+            let left = solved[RESIDUAL * TILE_COLUMNS + c].to_f64() > MAX_LEFT * differences;
+            if found == Status::Ok && left && differences > MIN_CONTRADICTION.powi(2) * largest {
+                found = Status::Inconsistent;
             }
             status[j * width + out] = found;
         }

@@ -8,8 +8,7 @@
 //! `A_p`, `b_p` the rows of [`RowSet`], all of equal weight. Its normal matrix `sum w T^T A^T A T` consists
 //! of the moments 1, dx, dy, dx^2, dx dy, dy^2 of products of jets, which are separable sums.
 //!
-//! There is no pyramid: motion should stay below about a pixel a frame for fine texture. Equations, rows and
-//! what the covariance holds: `docs/local_flow.md`.
+//! There is no pyramid: motion should stay below a pixel a frame for fine texture (`docs/local_flow.md`).
 //!
 //! # Files, in the order of the data
 //! `options`; `run` (crop, smoothing, strips, results to the field) with `support` (usable pixels) and

@@ -23,14 +23,19 @@ impl RowSet {
     /// Every row set, fewest rows first.
     pub const EVERY: [Self; 4] = [Self::Brightness, Self::Gradient, Self::Jet, Self::All];
 
+    /// The name used in options, and the number of equations that a pixel contributes.
+    fn entry(self) -> (&'static str, usize) {
+        match self {
+            Self::Brightness => ("brightness", 1),
+            Self::Gradient => ("gradient", 3),
+            Self::Jet => ("jet", 6),
+            Self::All => ("all", 12),
+        }
+    }
+
     /// The name used in options: `brightness`, `gradient`, `jet`, `all`.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Brightness => "brightness",
-            Self::Gradient => "gradient",
-            Self::Jet => "jet",
-            Self::All => "all",
-        }
+        self.entry().0
     }
 
     /// The row set called `name`.
@@ -46,12 +51,7 @@ impl RowSet {
 
     /// Number of equations a pixel contributes: 1, 3, 6 or 12.
     pub fn count(self) -> usize {
-        match self {
-            Self::Brightness => 1,
-            Self::Gradient => 3,
-            Self::Jet => 6,
-            Self::All => 12,
-        }
+        self.entry().1
     }
 }
 

@@ -249,7 +249,7 @@ fn withdraw_unusable<T: SimdReal>(band: &mut FieldBand<'_, T>, places: Range<usi
             band.status[place] = Status::NonFinite;
             band.covariance.iter_mut().for_each(|plane| plane[place] = T::nan());
         }
-        if !matches!(band.status[place], Status::Ok | Status::MinNorm) {
+        if !band.status[place].is_valid() && band.status[place] != Status::MinNorm {
             band.motion.iter_mut().for_each(|plane| plane[place] = T::nan());
         }
     }
