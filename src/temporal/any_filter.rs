@@ -196,8 +196,8 @@ impl AnyFlowFilter {
         let threads = self.options.threads;
         self.filter = match filter {
             Filter::Empty => Filter::Empty,
-            Filter::Single(filter) => Filter::Single(filter.with_threads(threads)),
-            Filter::Double(filter) => Filter::Double(filter.with_threads(threads)),
+            Filter::Single(filter) => Filter::Single(filter.with_computation(threads, None)),
+            Filter::Double(filter) => Filter::Double(filter.with_computation(threads, None)),
         };
         self.dtype = dtype;
         Ok(())

@@ -71,7 +71,6 @@ impl<T: SimdReal> Kernel<T> for Measure<'_, T> {
         let (one, zero) = (V::constant(1.0), V::zero());
         let inverse = V::constant(if self.fit.freedom > 0.0 { 1.0 / self.fit.freedom } else { f64::NAN });
         let (threshold, scale) = (V::constant(self.fit.threshold), V::splat(self.scale));
-        let per_sample = V::constant(1.0 / self.fit.offsets.len() as f64);
         for (b, pixels) in self.pixels.chunks_exact(BLOCK).enumerate() {
             let measured = &mut self.measured[b * MEASURED * BLOCK..(b + 1) * MEASURED * BLOCK];
             // The last block of a narrow frame repeats its last pixel: both ends alone are not enough.
@@ -114,7 +113,7 @@ impl<T: SimdReal> Kernel<T> for Measure<'_, T> {
                 let misfit = V::select(threshold.lt(variance), variance, zero);
                 V::select(good, misfit, zero).store(&mut measured[MISFIT * BLOCK + at..]);
                 // A misfit is above zero only where the samples differ.
-                let share = left / (sum.neg_mul_add(sum * per_sample, squares));
+                let share = left / sum.neg_mul_add(sum * V::constant(1.0 / self.fit.offsets.len() as f64), squares);
                 let share = V::select(zero.lt(misfit), share.min(one), zero);
                 V::select(good, share, zero).store(&mut measured[SHARE * BLOCK + at..]);
             }

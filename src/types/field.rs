@@ -82,7 +82,6 @@ impl<T: Real> FlowField<T> {
             frame_index: 0,
             correlation_length: 0.0,
         };
-        let mut field = Self::empty(layout, false)?;
         if let Some(planes) = &covariance {
             let (entries, found) = (p * (p + 1) / 2 * n, planes.len());
             // Row k of the upper triangle begins with a variance.
@@ -96,12 +95,10 @@ impl<T: Real> FlowField<T> {
                 return Err(Error::argument("covariance", expected, got));
             }
         }
-        for (site, status) in field.status.iter_mut().enumerate() {
-            let is_known = (0..p).all(|k| motion[k * n + site].finite());
-            *status = if is_known { Status::Ok } else { Status::Unobservable };
-        }
-        (field.motion, field.covariance) = (motion, covariance);
-        Ok(field)
+        let is_known = |site: usize| (0..p).all(|k| motion[k * n + site].finite());
+        let status = |site| if is_known(site) { Status::Ok } else { Status::Unobservable };
+        let status = (0..n).map(status).collect();
+        Ok(Self { motion, covariance, status, ..Self::empty(layout, false)? })
     }
 
     /// A field of NaN with status `Border`, to be filled by an estimator.

@@ -96,10 +96,6 @@ impl<T: SimdReal> FlowFilter<T> {
     pub fn repairs(&self) -> u64 {
         self.repairs
     }
-    /// The same filter on another number of threads; results do not depend on it.
-    pub fn with_threads(self, threads: Threads) -> Self {
-        self.with_computation(threads, None)
-    }
     /// Number of result sites.
     pub fn len(&self) -> usize {
         self.store.fixed.len()

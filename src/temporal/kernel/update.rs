@@ -34,8 +34,8 @@ pub(in crate::temporal) struct Decorrelation<T> {
     pub variances: [T; 6],
     /// Variance of the pixel noise that they are for.
     pub noise: T,
-    /// The jet's covariance for pixel noise of variance 1: lower triangle.
-    pub unit: [T; 21],
+    /// The jet's covariance for pixel noise of variance 1.
+    pub unit: [[T; 6]; 6],
 }
 
 impl<T: SimdReal> Decorrelation<T> {
@@ -63,12 +63,7 @@ impl<T: SimdReal> Decorrelation<T> {
                 }
             }
         }
-        let mut unit = [T::from_f64(0.0); 21];
-        for a in 0..6 {
-            for b in 0..=a {
-                unit[packed(a, b)] = T::from_f64(covariance[a][b]);
-            }
-        }
+        let unit = covariance.map(|row| row.map(T::from_f64));
         Self { steps, variances: variances.map(T::from_f64), noise: T::from_f64(noise), unit }
     }
 }
@@ -167,8 +162,11 @@ fn update<V: Lanes>(
 ) -> (V, u32) {
     let steps = &decorrelation.steps;
     let entering = given.misfit * given.scale;
-    for k in 0..21 {
-        lane.cov[k] = entering.mul_add(V::splat(decorrelation.unit[k]), lane.cov[k]);
+    for a in 0..6 {
+        for b in 0..=a {
+            let at = packed(a, b);
+            lane.cov[at] = entering.mul_add(V::splat(decorrelation.unit[a][b]), lane.cov[at]);
+        }
     }
     let mut variances = [V::zero(); 6];
     let ratio = (given.misfit / V::splat(decorrelation.noise)).max(V::constant(1.0));

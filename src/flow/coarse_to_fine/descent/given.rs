@@ -1,7 +1,7 @@
 //! Descent with a given flow, which competes with the flow that the frames alone give.
 
 use super::comparison::Comparison;
-use super::iteration::MIN_MOTION_DIFFERENCE;
+use super::iteration::{JOINT_ITERATIONS, MIN_MOTION_DIFFERENCE};
 use super::{DescentPlan, DescentResult, coarsened, site_counts};
 use crate::flow::coarse_to_fine::data_term::MOTION;
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
@@ -14,8 +14,6 @@ use crate::types::Frame;
 
 /// Levels above the finest on which the given flow competes: its errors are smaller than structure there.
 const LEVELS_ABOVE: usize = 2;
-/// Iterations after both motions are combined.
-const JOINT_ITERATIONS: usize = 2;
 /// Steps of the iteration that carries a pair's flow to the time midway between its frames.
 const MIDWAY_STEPS: usize = 3;
 

@@ -33,7 +33,7 @@ pub(super) const MIN_MOTION_DIFFERENCE: f64 = 0.5;
 /// Minimum change in the first iteration of the trial, px of the level: else no site leaves its motion.
 const MIN_TRIAL_CHANGE: f64 = 0.25;
 /// Regularised iterations after both motions are combined.
-const JOINT_ITERATIONS: usize = 2;
+pub(super) const JOINT_ITERATIONS: usize = 2;
 
 pub(super) struct Iteration<'a, T> {
     pub plan: &'a DescentPlan,
