@@ -128,7 +128,7 @@ fn planar(
     let Some(twin) = planar_twin(whitening, inliers, &solution.motion, distinct, unknown) else {
         return false;
     };
-    let excess = twin.behind - solution.behind;
+    let excess = twin.excess - solution.behind;
     if excess >= EXCLUDED {
         return false;
     }

@@ -79,16 +79,25 @@ pub(crate) fn shift(whitening: &Whitening<'_>, points: &Observations, motion: &M
     share * h.cholesky().map_or(most, |factor| g.dot(&factor.solve(&g)).min(most))
 }
 
-/// Takes the rotation of the first of `found`, the minima of the points, out of them until it stays, and
-/// refines the others.
-pub(crate) fn settle(whitening: &Whitening<'_>, points: &mut Observations, found: &mut Vec<Minimum>) {
-    let mut first = found[0];
+/// Takes the rotation of a motion out of the points until it stays: the minimum that is reached from `start`.
+pub(crate) fn with_own_rotation(whitening: &Whitening<'_>, points: &mut Observations, start: Motion) -> Minimum {
+    let stopping = StoppingCriteria::of(points.n);
+    let (mut motion, mut found) = (start, None);
     for _ in 0..ROUNDS {
-        if !is_another_rotation(points, &first.motion) {
+        if !is_another_rotation(points, &motion) {
             break;
         }
-        *points = whitening.derotated(points, first.motion.derotation());
-        first = refine(points, first.motion, StoppingCriteria::of(points.n));
+        *points = whitening.derotated(points, motion.derotation());
+        motion = found.insert(refine(points, motion, stopping)).motion;
+    }
+    found.unwrap_or_else(|| refine(points, motion, stopping))
+}
+
+/// Takes the rotation of the first of `found`, the minima of the points, out of them, and refines the others.
+pub(crate) fn settle(whitening: &Whitening<'_>, points: &mut Observations, found: &mut Vec<Minimum>) {
+    let mut first = found[0];
+    if is_another_rotation(points, &first.motion) {
+        first = with_own_rotation(whitening, points, first.motion);
     }
     let again = |other: &Minimum| refine(points, other.motion, StoppingCriteria::ROUGH);
     let others: Vec<Minimum> = found[1..].par_iter().map(again).collect();
