@@ -1,10 +1,9 @@
 //! Experiment design: what a layout of points, a field of view and a noise allow.
 
-use super::estimate::MIN_POINTS;
 use super::kernels::{equations, information, slopes};
 use super::model::input::{Flow, Noise, Placement};
 use super::model::motion::Motion;
-use super::model::observations::Observations;
+use super::model::observations::{Observations, UNKNOWNS};
 use super::model::result::{axes, nested};
 use super::model::rows::{Matrix5, tangents};
 use super::model::whitening::Whitening;
@@ -84,7 +83,7 @@ fn of_known_depths(
     check_motion(&motion.translation, &motion.rotation)?;
     let observations = Whitening::new(points, noise, Placement::Start).whitened();
     let places: Vec<[f64; 3]> = (0..points.len()).map(|k| points.place(k).into()).collect();
-    let known = with_known_depth(&observations.source, (&places, inverse_depth), |nu| nu.is_finite(), MIN_POINTS)?;
+    let known = with_known_depth(&observations.source, (&places, inverse_depth), |nu| nu.is_finite(), UNKNOWNS)?;
     let observations = observations.subset(&known);
     let mut nu: Vec<f64> = observations.source.iter().map(|&k| inverse_depth[k as usize]).collect();
     nu.resize(observations.stride, 0.0);

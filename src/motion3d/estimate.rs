@@ -2,19 +2,18 @@
 //! to them and assembles the result.
 
 use super::diagnostics::report::{doubted, of_estimated_noise, report, rotation_report};
-use super::diagnostics::rotation::of_flow_alone;
 use super::diagnostics::rotation::{
     explained_by_rotation, explained_by_rotation_in_unknown_noise, without_likeliest_rotation,
 };
 use super::diagnostics::solution::Solution;
 use super::diagnostics::status::judge;
 use super::model::input::{Flow, Noise};
-use super::model::observations::{Observations, Scaled};
+use super::model::observations::{Observations, Scaled, UNKNOWNS};
 use super::model::options::{Method, MotionOptions, RotationPrior};
 use super::model::result::{Alternative, MotionEstimate, Status};
 use super::model::whitening::Whitening;
 use super::robust;
-use super::robust::{CompetingMotion, Consensus, larger};
+use super::robust::{Consensus, larger};
 use super::solver::covariance::plugged;
 use super::solver::efficient::{beyond_theory, covariance_at};
 use super::solver::finite_rotation::{settle, shift};
@@ -25,9 +24,6 @@ use super::solver::smoothing::DepthSmoother;
 use crate::error::Result;
 use crate::math::by_chance;
 use crate::math::random::CounterRng;
-
-/// Least number of points for a motion.
-pub(crate) const MIN_POINTS: usize = 5;
 
 /// The rigid motion that explains a flow field, with covariance and depths.
 ///
@@ -56,7 +52,7 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
         let chosen: Vec<u32> = (0..scaled.observations.n as u32).filter(known).collect();
         scaled.observations = scaled.observations.subset(&chosen);
     }
-    if scaled.observations.n < MIN_POINTS {
+    if scaled.observations.n < UNKNOWNS {
         let noise_std = if scaled.unknown { f64::NAN } else { noise_std };
         return MotionEstimate::nothing(flow.len(), Status::TooFewPoints, noise_std);
     }
@@ -150,7 +146,7 @@ impl Task<'_, '_> {
             return estimate;
         }
         if scaled.unknown {
-            inliers.rescale(scaled.take((cost / inliers.n.saturating_sub(5).max(1) as f64).sqrt()));
+            inliers.rescale(scaled.take((cost / inliers.n.saturating_sub(UNKNOWNS).max(1) as f64).sqrt()));
             found =
                 found.iter().map(|minimum| refine(&inliers, minimum.motion, StoppingCriteria::of(inliers.n))).collect();
         }
@@ -159,14 +155,11 @@ impl Task<'_, '_> {
         // Undetermined: the points were derotated about a different rotation.
         solution.described &= shift(self.whitening, &inliers, &solution.motion) <= MAX_SHIFT;
         self.inflate(&mut solution, scaled, &inliers, candidates[0].minimum.equations.cost);
-        if solution.contradicted(&inliers) {
-            solution.undecided = Some(of_flow_alone(&inliers, &solution.motion));
-        }
         solution.alternatives = near_best(&candidates, inliers.n)[1..]
             .iter()
             .map(|other| Alternative { motion: *other.motion(), excess: other.cost - candidates[0].cost })
             .collect();
-        let competing: &[CompetingMotion] = self.known.map_or(&[], |known| &known.competing);
+        let competing: &[Alternative] = self.known.map_or(&[], |known| &known.competing);
         judge(self.whitening, &inliers, &mut solution, scaled.unknown, competing, self.rng.stream(4));
         report(flow, &scaled.observations, &inliers, &solution, scaled.noise_std)
     }
@@ -237,7 +230,7 @@ impl Task<'_, '_> {
             let mut smoother = made.unwrap_or_else(|| self.smoother(inliers));
             tried = smoothed(inliers, self.options, candidates, &mut smoother);
         }
-        let (mut improved, undecided) = tried.map_or((None, None), |(best, undecided)| (Some(best), undecided));
+        let (mut improved, undecided) = tried.unzip();
         // Maximum likelihood alone is undetermined beyond its theory; a minimum from where smoothed weights
         // lead nowhere is spurious.
         let mut described = !bent && !wanted;
@@ -245,8 +238,8 @@ impl Task<'_, '_> {
             (best.covariance, described) = best.lengthened(inliers, || self.smoother(inliers));
         }
         let undescribed = plugged.is_none() && improved.is_none();
-        let mut solution = Solution::new(chosen, plugged.as_ref(), improved, wanted);
-        (solution.described, solution.undecided) = (described, undecided);
+        let mut solution = Solution::new(chosen.minimum, plugged, improved, wanted);
+        (solution.described, solution.undecided) = (described, undecided.flatten());
         if undescribed {
             solution.covariance = covariance_at(inliers, &solution.motion, &mut self.smoother(inliers));
         }
@@ -270,7 +263,7 @@ impl Task<'_, '_> {
             // What outliers leave among truncated residuals is accounted for.
             (false, Some(_)) => larger(&scaled.observations, &solution.motion),
         };
-        solution.inflate(wider, common);
+        solution.inflate(inliers, wider, common);
     }
 }
 
@@ -278,6 +271,6 @@ impl Task<'_, '_> {
 /// the model leaves out (larger noise than given, outliers, a minimum that was missed), the motion is off by
 /// as much (R. Birge 1932).
 fn misfit(inliers: &Observations, cost: f64) -> f64 {
-    let free = inliers.n.saturating_sub(5) as f64 / inliers.points_per_independent_sample;
+    let free = inliers.n.saturating_sub(UNKNOWNS) as f64 / inliers.points_per_independent_sample;
     if free > 0.0 && !by_chance(cost, free) { cost / free } else { 1.0 }
 }

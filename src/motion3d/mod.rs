@@ -67,7 +67,7 @@ pub use field::{
     FieldMotion, FieldOptions, FieldPatches, FieldPoints, estimate_field_motion, field_patches, field_points,
 };
 pub use lateral::{LateralBound, LateralEstimate, LateralWeights, estimate_lateral, lateral_bound};
-pub use model::input::{Flow, Noise, Placement, Projection};
+pub use model::input::{Flow, Noise, Placement};
 pub use model::motion::Motion;
 pub use model::options::{CommonErrors, Method, MotionOptions, RotationPrior, Smoother};
 pub use model::result::{

@@ -9,7 +9,7 @@ use crate::motion3d::model::rows::{Derotation, Matrix5, MidpointDepth, Vector5};
 use crate::motion3d::model::whitening::plane_row;
 use crate::parallel::Threads;
 use crate::types::{FlowField, Intrinsics, Status};
-use nalgebra::{Matrix2, Matrix2x3, RowVector2, Vector2, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, RowVector2, SVector, Vector2, Vector3};
 use rayon::prelude::*;
 
 /// Rates of approach `nu u_z` under a motion.
@@ -22,24 +22,9 @@ pub(crate) struct Rates {
     common: CommonEffect,
 }
 
-/// Slopes of a rate along the axes of `u` and along `w`, and by the point's own flow on the plane at distance
-/// 1.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Slopes {
-    motion: Vector5,
-    flow: RowVector2<f64>,
-}
-
-impl Slopes {
-    pub fn add(&mut self, other: &Self, weight: f64) {
-        self.motion += other.motion * weight;
-        self.flow += other.flow * weight;
-    }
-
-    pub fn times(&self, factor: f64) -> Self {
-        Self { motion: self.motion * factor, flow: self.flow * factor }
-    }
-}
+/// Slopes of a rate along the axes of `u` and along `w` (5), and by the point's own flow on the plane at
+/// distance 1 (2).
+pub(crate) type Slopes = SVector<f64, 7>;
 
 impl Rates {
     /// Without a covariance, standard deviations are NaN.
@@ -68,14 +53,15 @@ impl Rates {
         motion *= self.u.z;
         motion[0] += nu * self.tangent[(0, 2)];
         motion[1] += nu * self.tangent[(1, 2)];
-        Slopes { motion, flow: flow * self.u.z }
+        let [along, across] = (flow * self.u.z).into();
+        motion.push(along).push(across)
     }
 
     /// What the motion's covariance makes of slopes, and what errors do that all flow has in common: a factor
     /// is one of the rate, a displacement moves the motion and each point's depth together.
     pub fn variance(&self, rate: f64, slopes: &Slopes) -> f64 {
-        let own = (slopes.motion.transpose() * self.covariance * slopes.motion)[0];
-        own + self.common.variance(rate, &slopes.motion, &slopes.flow)
+        let (motion, flow) = (slopes.fixed_rows::<5>(0).into_owned(), slopes.fixed_rows::<2>(5).transpose());
+        motion.dot(&(self.covariance * motion)) + self.common.variance(rate, &motion, &flow)
     }
 
     /// `-1 / (nu u_z)` and its standard deviation, frames, by first order from the variance of `nu` and from
@@ -195,7 +181,7 @@ mod tests {
         };
         let t = row.g * scene.motion.u();
         let nu = t.dot(&(row.f - row.r * scene.motion.w())) / t.norm_squared();
-        let slopes = rates.slopes(&row, nu).motion;
+        let slopes = rates.slopes(&row, nu).fixed_rows::<5>(0).into_owned();
         // Along the epipolar line alone: the part across moves the depth in second order only at the truth.
         for axis in 2..5 {
             let mut step = Vector5::zeros();

@@ -16,7 +16,7 @@ use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::rows::tangents;
 use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::finite_rotation::with_own_rotation;
-use crate::motion3d::solver::starts::at_most;
+use crate::motion3d::solver::starts::{SEARCHED, at_most};
 use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, Vector2, Vector3};
 
 /// Unknowns of a plane's flow: motion and plane; and three more that bend the surface.
@@ -26,15 +26,12 @@ const CURVED: usize = PLANE + 3;
 /// Steps towards the plane and its motion.
 const STEPS: usize = 4;
 
-/// Points that are tested first for a plane.
-const FEW: usize = 1000;
-
 /// A plane `nu = n . eta` with its motion, of displacements in the axes half way.
 struct Plane {
     n: Vector3<f64>,
     motion: Motion,
-    /// Squares of what it leaves of the flow, and how much of that a curved surface explains; in squared units
-    /// of noise.
+    /// Squares of what it leaves of the flow, and how much of that a curved surface explains; in squared
+    /// units of noise.
     chi2: f64,
     bend: f64,
     /// Measurements less unknowns.
@@ -117,8 +114,8 @@ impl Plane {
 
     /// The other motion, and the points with its own rotation taken out of displacements.
     fn other(&self, whitening: &Whitening<'_>, points: &Observations) -> Option<(Motion, Observations)> {
-        // In the axes half way the translation is V' u and rotations are V' w; the plane is that of the points
-        // half way.
+        // In the axes half way the translation is V' u and rotations are V' w; the plane is that of the
+        // points half way.
         let mean = points.turn.map_or(Matrix3::identity(), |turn| turn.mean);
         let (back, t) = (mean.try_inverse()?, mean * self.motion.u());
         let n = if points.turn.is_some() { self.n / (1.0 + 0.5 * self.n.dot(&t)) } else { self.n };
@@ -143,8 +140,8 @@ pub(crate) fn planar_twin(
     unknown: bool,
 ) -> Option<Alternative> {
     // What is far from a plane is so for few points already.
-    if points.n > FEW {
-        let few = at_most(points, FEW, CounterRng::new(0));
+    if points.n > SEARCHED {
+        let few = at_most(points, SEARCHED, CounterRng::new(0));
         Plane::fit(&few, motion).filter(|plane| plane.fits(&few, unknown))?;
     }
     let plane = Plane::fit(points, motion).filter(|plane| plane.fits(points, unknown) && plane.n.norm() > 0.0)?;

@@ -2,24 +2,22 @@
 
 use super::contact::{Rates, Slopes};
 use super::correlated_noise::correlated_rotation_covariance;
-use super::rotation::RotationOnly;
-use super::rotation::rotation_contradiction;
+use super::rotation::{RotationOnly, contradicted_rotation};
 use super::solution::{Solution, rotation_shift};
 use crate::motion3d::kernels::{Depths, Equations, depths, equations};
 use crate::motion3d::model::input::{Flow, to_plane};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::MotionOptions;
-use crate::motion3d::model::result::{MotionEstimate, Status, axes, nested};
+use crate::motion3d::model::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
 use crate::motion3d::model::rows::{Matrix5, MidpointDepth};
+use crate::motion3d::model::whitening::TOGETHER;
 use crate::motion3d::robust;
 use crate::motion3d::robust::Consensus;
-use crate::motion3d::solver::covariance::{direction_deviation, plugged};
+use crate::motion3d::solver::covariance::{PluginCovariances, direction_deviation, plugged};
+use crate::motion3d::solver::refine::Minimum;
 use nalgebra::{Matrix2x3, Matrix3, Vector3};
 use rayon::prelude::*;
-
-/// Fewest points for which a thread pays.
-const TOGETHER: usize = 1000;
 
 /// From inverse depths in the rows to those half way in time.
 fn half_way(points: &Observations, motion: &Motion) -> MidpointDepth {
@@ -45,7 +43,7 @@ pub(crate) fn report(
     let motion = &solution.motion;
     let here = equations(inliers, motion, &solution.tangent, None);
     set_motion(&mut out, motion, &solution.tangent, solution.covariance.as_ref(), &here);
-    out.likelihood = solution.likelihood;
+    out.likelihood = likelihood(&solution.minimum, solution.plugged.as_ref());
     out.alternatives.clone_from(&solution.alternatives);
     out.efficient = solution.smooth.is_some();
     out.fell_back = solution.fell_back;
@@ -71,6 +69,16 @@ pub(crate) fn report(
     out
 }
 
+/// Maximum likelihood beside the solution that is returned.
+pub(crate) fn likelihood(minimum: &Minimum, plugged: Option<&PluginCovariances>) -> Likelihood {
+    Likelihood {
+        motion: minimum.motion,
+        covariance: plugged.map_or(UNKNOWN, |plugged| nested(&plugged.likelihood)),
+        tangent: axes(&minimum.tangent),
+        cost: minimum.equations.cost,
+    }
+}
+
 /// A motion with its covariance, where that is known, and its bound by the equations there.
 pub(crate) fn set_motion(
     out: &mut MotionEstimate,
@@ -90,25 +98,19 @@ pub(crate) fn set_motion(
     }
 }
 
-/// Inverse depths and their variances for times to contact, by source: the smoothed ones where there are any,
-/// else the point's own.
-fn likeliest(out: &MotionEstimate, inliers: &Observations, solution: &Solution) -> Vec<(f64, f64)> {
-    let half_way = half_way(inliers, &solution.motion);
-    let own = out.inverse_depth.iter().zip(&out.inverse_depth_std);
-    let mut depths: Vec<(f64, f64)> = own.map(|(nu, deviation)| (*nu, deviation * deviation)).collect();
-    if let (Some(nu), Some(variance)) = (&solution.smooth, &solution.variance) {
-        for (k, &source) in inliers.source.iter().enumerate() {
-            depths[source as usize] = (half_way.depth(nu[k]), variance[k] * half_way.slope(nu[k]).powi(2));
-        }
-    }
-    depths
-}
-
-/// Times to contact with their standard deviations, by first order from those of the depth and of the motion;
-/// and the rate of approach of all inliers together.
+/// Times to contact with their standard deviations, by first order from those of the depth (the smoothed one
+/// where there is any, else the point's own) and of the motion; and the rate of approach of all inliers
+/// together.
 fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations, seen: &Depths, solution: &Solution) {
     let rates = Rates::new(&out.uncertain());
-    let likeliest = likeliest(out, inliers, solution);
+    let half_way = half_way(inliers, &solution.motion);
+    let own = out.inverse_depth.iter().zip(&out.inverse_depth_std);
+    let mut likeliest: Vec<(f64, f64)> = own.map(|(nu, deviation)| (*nu, deviation * deviation)).collect();
+    if let (Some(nu), Some(variance)) = (&solution.smooth, &solution.variance) {
+        for (k, &source) in inliers.source.iter().enumerate() {
+            likeliest[source as usize] = (half_way.depth(nu[k]), variance[k] * half_way.slope(nu[k]).powi(2));
+        }
+    }
     let u_z = solution.motion.u().z;
     let rated = |k: usize| {
         let (nu, variance) = likeliest[all.source[k] as usize];
@@ -118,18 +120,18 @@ fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations,
     };
     let rated: Vec<((f64, f64), Slopes)> = (0..all.n).into_par_iter().with_min_len(TOGETHER).map(rated).collect();
     // Summed in one order, whoever computed them.
-    let (mut weights, mut sum, mut slopes) = (0.0, 0.0, Slopes::default());
+    let (mut weights, mut sum, mut slopes) = (0.0, 0.0, Slopes::zeros());
     for (k, (contact, own)) in rated.iter().enumerate() {
         let source = all.source[k] as usize;
         (out.time_to_contact[source], out.time_to_contact_std[source]) = *contact;
         if out.inliers[source] && seen.s2[k] > 0.0 {
             weights += seen.s2[k];
             sum += seen.s2[k] * seen.nu[k] * u_z;
-            slopes.add(own, seen.s2[k]);
+            slopes += own * seen.s2[k];
         }
     }
     let rate = sum / weights;
-    out.approach = (rate, (u_z * u_z / weights + rates.variance(rate, &slopes.times(1.0 / weights))).sqrt());
+    out.approach = (rate, (u_z * u_z / weights + rates.variance(rate, &(slopes / weights))).sqrt());
 }
 
 /// The result of a camera that only rotates, or stands still.
@@ -142,20 +144,22 @@ pub(crate) fn rotation_report(
     options: &MotionOptions,
 ) -> MotionEstimate {
     let mut out = MotionEstimate::nothing(flow.len(), Status::RotationOnly, noise_std);
-    let moved = rotation_shift(inliers, &rotation.covariance) * to_plane(flow.camera());
-    let mut covariance = rotation.covariance;
-    if let Some(length) = options.correlation_length.filter(|length| *length > 0.0) {
-        covariance = correlated_rotation_covariance(&covariance, inliers, &rotation.rotation, flow, length);
+    let widened = |rotation: &RotationOnly| {
+        let moved = rotation_shift(inliers, &rotation.covariance) * to_plane(flow.camera());
+        let RotationOnly { rotation, covariance, .. } = rotation;
+        let length = options.correlation_length.filter(|length| *length > 0.0);
+        let own = length
+            .map_or(*covariance, |length| correlated_rotation_covariance(covariance, inliers, rotation, flow, length));
+        own + options.systematic_errors().added_to_rotation(rotation, &moved)
+    };
+    let mut covariance = widened(rotation);
+    if let Some(alone) = contradicted_rotation(inliers, widened) {
+        let apart = alone.rotation - rotation.rotation;
+        covariance += apart * apart.transpose();
+        let motion = Motion { translation: [f64::NAN; 3], rotation: alone.rotation.into() };
+        let excess = alone.chi2 + inliers.pulled(&alone.rotation) - rotation.chi2;
+        out.alternatives.push(Alternative { motion, excess });
     }
-    let common = options.systematic_errors().added_to_rotation(&rotation.rotation, &moved);
-    if let Some(known) = &inliers.prior
-        && let Some((added, alone)) =
-            rotation_contradiction(known, &rotation.rotation, &rotation.covariance, &covariance, &common)
-    {
-        covariance += added;
-        out.alternatives.push(alone);
-    }
-    covariance += common;
     report_rotation(&mut out, &rotation.rotation, &covariance, rotation.chi2, &all.source);
     let rest = |k: usize| {
         let row = all.row(k);

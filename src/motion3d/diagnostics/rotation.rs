@@ -15,7 +15,7 @@ use crate::motion3d::model::rows::{Derotation, Matrix5, Vector5, tangents};
 use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::covariance::{DETERMINED, inverse};
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
-use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
 
 /// Least squares for the rotation alone.
 #[derive(Debug, Clone, Copy)]
@@ -28,6 +28,32 @@ pub(crate) struct RotationOnly {
 }
 
 impl RotationOnly {
+    /// From rows `f = R w + noise` of all points, and what is known of the rotation.
+    pub fn of_rows<const N: usize>(
+        rows: impl Iterator<Item = (SMatrix<f64, N, 3>, SVector<f64, N>)> + Clone,
+        known: Option<&KnownRotation>,
+    ) -> Option<Self> {
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for (r, f) in rows.clone() {
+            normal += r.tr_mul(&r);
+            right += r.tr_mul(&f);
+        }
+        if let Some(known) = known {
+            normal += known.information;
+            right += known.pull(&Vector3::zeros()).0;
+        }
+        // Points at one place determine two of three unknowns; what rounding adds is no information.
+        if SymmetricEigen::new(normal).eigenvalues.min() <= DETERMINED * normal.trace() {
+            return None;
+        }
+        let factor = normal.cholesky()?;
+        let (rotation, covariance) = (factor.solve(&right), factor.inverse());
+        let left = rows.map(|(r, f)| (f - r * rotation).norm_squared()).sum::<f64>();
+        let chi2 = left + known.map_or(0.0, |known| known.pull(&rotation).1);
+        let finite = rotation.iter().chain(covariance.iter()).all(|value| value.is_finite());
+        finite.then_some(Self { rotation, covariance, chi2 })
+    }
+
     /// The same after all measurements were multiplied by `factor`.
     pub fn in_units(self, factor: f64) -> Self {
         let square = factor * factor;
@@ -43,45 +69,8 @@ const FEW_POINTS: f64 = 12.0;
 /// The rotation that explains the flow best without a translation; `None` where the points do not determine
 /// it.
 pub(crate) fn rotation_only(observations: &Observations) -> Option<RotationOnly> {
-    let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    let plane = |p: usize| observations.plane(p);
-    for (component, first) in [6, 9].into_iter().enumerate() {
-        let r = [plane(first), plane(first + 1), plane(first + 2)];
-        let f = plane(12 + component);
-        let mut sums = [0.0; 9];
-        for (((&x, &y), &z), &f) in r[0].iter().zip(r[1]).zip(r[2]).zip(f) {
-            for (sum, value) in sums.iter_mut().zip([x * x, x * y, x * z, y * y, y * z, z * z, x * f, y * f, z * f]) {
-                *sum += value;
-            }
-        }
-        let [xx, xy, xz, yy, yz, zz, xf, yf, zf] = sums;
-        normal += Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-        right += Vector3::new(xf, yf, zf);
-    }
-    if let Some(known) = &observations.prior {
-        normal += known.information;
-        right += known.pull(&Vector3::zeros()).0;
-    }
-    // Points at one place determine two of three unknowns; what rounding adds is no information.
-    if SymmetricEigen::new(normal).eigenvalues.min() <= DETERMINED * normal.trace() {
-        return None;
-    }
-    let factor = normal.cholesky()?;
-    let rotation = factor.solve(&right);
-    let mut chi2 = observations.pulled(&rotation);
-    for (component, first) in [6, 9].into_iter().enumerate() {
-        let r = [plane(first), plane(first + 1), plane(first + 2)];
-        for (((&x, &y), &z), &f) in r[0].iter().zip(r[1]).zip(r[2]).zip(plane(12 + component)) {
-            let rest = f - (x * rotation.x + y * rotation.y + z * rotation.z);
-            chi2 += rest * rest;
-        }
-    }
-    let covariance = factor.inverse();
-    rotation.iter().chain(covariance.iter()).all(|value| value.is_finite()).then_some(RotationOnly {
-        rotation,
-        covariance,
-        chi2,
-    })
+    let row = |k: usize| observations.row(k);
+    RotationOnly::of_rows((0..observations.n).map(|k| (row(k).r, row(k).f)), observations.prior.as_ref())
 }
 
 /// Times that the likeliest rotation is taken out and found again.
@@ -126,31 +115,17 @@ pub(crate) fn explained_by_rotation_in_unknown_noise(observations: &Observations
     (none || (left / sigma2).ln() > -SEARCHED / n.sqrt() - FEW_POINTS / n).then_some(rotation)
 }
 
-/// What a motion's covariance is made of: `own`, in which errors that the information takes for independent
-/// may go together, times `wider`, and what all flow has in `common`.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct CovarianceParts {
-    pub own: Matrix5,
-    pub wider: f64,
-    pub common: Matrix5,
-}
-
-impl CovarianceParts {
-    /// Together.
-    pub fn covariance(&self) -> Matrix5 {
-        self.own * self.wider + self.common
-    }
-}
-
 /// By how much the flow alone would lead to another motion, along `(psi, w)`; `None` where chance explains
 /// it, or where the flow alone does not determine a motion.
 ///
-/// `information`: of the flow and of the known rotation together.
+/// `information`: of the flow and of the known rotation together. The motion's covariance is `own`, in which
+/// errors that the information takes for independent may go together, times `wider`, and what all flow has in
+/// `common`.
 pub(crate) fn contradiction(
     known: &KnownRotation,
     w: &Vector3<f64>,
     information: &Matrix5,
-    parts: &CovarianceParts,
+    (own, wider, common): (&Matrix5, f64, &Matrix5),
 ) -> Option<Vector5> {
     let mut of_flow = *information;
     add_to_rotation(&mut of_flow, &known.information, -1.0);
@@ -160,9 +135,9 @@ pub(crate) fn contradiction(
     let apart = (before + alone.fixed_view::<3, 3>(2, 2)) * force;
     // What errors do to the motion they do to that of the flow alone, which nothing holds back, the more.
     let freed = alone * information;
-    let own = freed * parts.own * freed.transpose() + alone - freed * alone;
+    let own = freed * own * freed.transpose() + alone - freed * alone;
     // Of both only the flow's noise may be larger than given.
-    let spread = own * parts.wider + freed * parts.common * freed.transpose();
+    let spread = own * wider + freed * common * freed.transpose();
     let expected = before + spread.fixed_view::<3, 3>(2, 2);
     let expected = 0.5 * (expected + expected.transpose());
     let square = apart.dot(&expected.cholesky()?.solve(&apart));
@@ -172,33 +147,18 @@ pub(crate) fn contradiction(
 /// The motion of the flow alone, the nearest one to `motion`, and how much less likely it is with
 /// the known rotation.
 pub(crate) fn of_flow_alone(inliers: &Observations, motion: &Motion) -> Alternative {
-    let mut alone = inliers.clone();
-    alone.prior = None;
-    let found = refine(&alone, *motion, StoppingCriteria::of(inliers.n)).motion;
+    let found = refine(&inliers.without_prior(), *motion, StoppingCriteria::of(inliers.n)).motion;
     let cost = |motion: &Motion| equations(inliers, motion, &tangents(&motion.u()), None).cost;
     Alternative { motion: found, excess: cost(&found) - cost(motion) }
 }
 
-/// The same of a rotation alone, by its covariance without and with what all flow has in common: what is to
-/// be added to that, and the motion of the flow alone.
-pub(crate) fn rotation_contradiction(
-    known: &KnownRotation,
-    w: &Vector3<f64>,
-    plain: &Matrix3<f64>,
-    own: &Matrix3<f64>,
-    common: &Matrix3<f64>,
-) -> Option<(Matrix3<f64>, Alternative)> {
-    // With a direction that nothing depends on.
-    let whole = |rotation: &Matrix3<f64>, direction: f64| {
-        let mut matrix = Matrix5::identity() * direction;
-        matrix.fixed_view_mut::<3, 3>(2, 2).copy_from(rotation);
-        matrix
-    };
-    let information = whole(&plain.cholesky()?.inverse(), 1.0);
-    let parts = CovarianceParts { own: whole(own, 1.0), wider: 1.0, common: whole(common, 0.0) };
-    let apart = contradiction(known, w, &information, &parts)?.fixed_rows::<3>(2).into_owned();
-    let (alone, (force, before)) = (w - apart, known.pull(w));
-    let excess = known.pull(&alone).1 - before - force.dot(&apart);
-    let motion = Motion { translation: [f64::NAN; 3], rotation: alone.into() };
-    Some((apart * apart.transpose(), Alternative { motion, excess }))
+/// The rotation of the flow alone where what is known beforehand contradicts it; `widened`: the covariance of
+/// a rotation with all errors.
+pub(crate) fn contradicted_rotation(
+    points: &Observations,
+    widened: impl Fn(&RotationOnly) -> Matrix3<f64>,
+) -> Option<RotationOnly> {
+    let (known, alone) = (points.prior?, rotation_only(&points.without_prior())?);
+    let (spread, off) = (known.information.cholesky()?.inverse() + widened(&alone), known.rotation - alone.rotation);
+    (!by_chance(off.dot(&spread.cholesky()?.solve(&off)), 3.0)).then_some(alone)
 }

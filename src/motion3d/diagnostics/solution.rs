@@ -2,18 +2,18 @@
 //! covariance.
 
 use super::correlated_noise::{Weighted, correlated_covariance};
-use super::rotation::{CovarianceParts, contradiction};
+use super::rotation::{contradiction, of_flow_alone};
 use crate::motion3d::kernels::{depths, equations, information, slopes};
 use crate::motion3d::model::input::{Flow, to_plane};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::CommonErrors;
-use crate::motion3d::model::result::{Alternative, CommonEffect, Likelihood, Moved, Status, UNKNOWN, axes, nested};
+use crate::motion3d::model::result::{Alternative, CommonEffect, Moved, Status};
 use crate::motion3d::model::rows::Matrix5;
 use crate::motion3d::robust::{Consensus, weighted_by_posterior};
-use crate::motion3d::solver::covariance::{PluginCovariances, direction_deviation, inverse};
+use crate::motion3d::solver::covariance::{PluginCovariances, inverse};
 use crate::motion3d::solver::efficient::{Efficient, nonlinearity_covariance};
-use crate::motion3d::solver::likelihood::Candidate;
+use crate::motion3d::solver::refine::Minimum;
 use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, RowVector2};
 use std::borrow::Cow;
 
@@ -25,14 +25,10 @@ pub(crate) struct Solution {
     pub covariance: Option<Matrix5>,
     /// What is in it of errors that all flow has in common.
     pub common: CommonEffect,
-    /// What it was made of.
-    grown: Option<CovarianceParts>,
-    /// Whether the depths are mostly noise, so that nothing is known of maximum likelihood's covariance.
-    pub low: bool,
-    /// Standard deviation of maximum likelihood's direction, degrees; 0 where it is not known.
-    pub likelihood_std: f64,
-    /// Squared depths behind the camera at maximum likelihood's motion, in units of their standard deviation.
-    pub behind: f64,
+    /// Maximum likelihood.
+    pub minimum: Minimum,
+    /// Its covariance; `None` where the depths are mostly noise, so that nothing is known of it.
+    pub plugged: Option<PluginCovariances>,
     /// Whether the covariance describes the shape of the confidence region.
     pub described: bool,
     /// Another solution that is about as likely, or the motion of the flow alone where that contradicts what
@@ -40,7 +36,6 @@ pub(crate) struct Solution {
     pub undecided: Option<Alternative>,
     pub status: Status,
     pub alternatives: Vec<Alternative>,
-    pub likelihood: Likelihood,
     /// Depths in the weights, where they were smoothed, and their variances where these are known.
     pub smooth: Option<Vec<f64>>,
     pub variance: Option<Vec<f64>>,
@@ -51,32 +46,22 @@ impl Solution {
     /// Maximum likelihood, and what became of the smoothed weights, which were `wanted` or only needed for
     /// maximum likelihood's covariance.
     pub fn new(
-        chosen: &Candidate,
-        plugged: Option<&PluginCovariances>,
+        minimum: Minimum,
+        plugged: Option<PluginCovariances>,
         improved: Option<Efficient>,
         wanted: bool,
     ) -> Self {
-        let minimum = &chosen.minimum;
-        let likelihood = Likelihood {
-            motion: minimum.motion,
-            covariance: plugged.map_or(UNKNOWN, |plugged| nested(&plugged.likelihood)),
-            tangent: axes(&minimum.tangent),
-            cost: minimum.equations.cost,
-        };
         let plain = Self {
             motion: minimum.motion,
             tangent: minimum.tangent,
-            covariance: plugged.map(|plugged| plugged.likelihood),
+            covariance: plugged.as_ref().map(|plugged| plugged.likelihood),
             common: CommonEffect::default(),
-            grown: None,
-            low: plugged.is_none(),
-            likelihood_std: plugged.map_or(0.0, |plugged| direction_deviation(&plugged.likelihood)),
-            behind: minimum.equations.behind,
+            minimum,
+            plugged,
             described: true,
             undecided: None,
             status: Status::Ok,
             alternatives: Vec::new(),
-            likelihood,
             smooth: None,
             variance: None,
             fell_back: wanted && improved.is_none(),
@@ -90,7 +75,7 @@ impl Solution {
                 variance: improved.variance,
                 ..plain
             },
-            Some(improved) => Self { covariance: Some(nonlinearity_covariance(minimum, &improved)), ..plain },
+            Some(improved) => Self { covariance: Some(nonlinearity_covariance(&minimum, &improved)), ..plain },
             None => plain,
         }
     }
@@ -122,26 +107,26 @@ impl Solution {
         common.on(&covariance, &self.motion, inliers.prior.as_ref(), (&moved, &to_plane(flow.camera())))
     }
 
-    /// Has in its covariance, multiplied by `wider`, what errors do that all flow has in common.
-    pub fn inflate(&mut self, wider: f64, common: CommonEffect) {
-        self.grown = self.covariance.map(|own| CovarianceParts { own, wider, common: common.added() });
-        self.covariance = self.grown.as_ref().map(CovarianceParts::covariance);
+    /// Has in its covariance, multiplied by `wider`, what errors do that all flow has in common. Where the
+    /// flow contradicts what is known beforehand of the rotation it reaches as far as the motion of the flow
+    /// alone.
+    pub fn inflate(&mut self, inliers: &Observations, wider: f64, common: CommonEffect) {
         self.common = common;
-    }
-
-    /// Whether the flow contradicts what is known beforehand of the rotation; the covariance then reaches as
-    /// far as the motion of the flow alone.
-    pub fn contradicted(&mut self, inliers: &Observations) -> bool {
-        let (Some(known), Some(grown)) = (inliers.prior.as_ref(), &self.grown) else { return false };
-        let precision = if let Some(nu) = &self.smooth {
-            information(inliers, &self.motion, &self.tangent, nu, 0.0)
-        } else {
-            let here = equations(inliers, &self.motion, &self.tangent, None);
-            here.h - here.p
-        };
-        let Some(apart) = contradiction(known, &self.motion.w(), &precision, grown) else { return false };
-        self.covariance = Some(grown.covariance() + apart * apart.transpose());
-        true
+        let (Some(own), common) = (self.covariance, common.added()) else { return };
+        let mut covariance = own * wider + common;
+        if let Some(known) = &inliers.prior {
+            let precision = if let Some(nu) = &self.smooth {
+                information(inliers, &self.motion, &self.tangent, nu, 0.0)
+            } else {
+                let here = equations(inliers, &self.motion, &self.tangent, None);
+                here.h - here.p
+            };
+            if let Some(apart) = contradiction(known, &self.motion.w(), &precision, (&own, wider, &common)) {
+                covariance += apart * apart.transpose();
+                self.undecided = Some(of_flow_alone(inliers, &self.motion));
+            }
+        }
+        self.covariance = Some(covariance);
     }
 
     /// The depths in the weights, as long as the planes.

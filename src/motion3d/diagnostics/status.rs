@@ -18,8 +18,7 @@ use crate::motion3d::model::options::Smoother;
 use crate::motion3d::model::result::{Alternative, Status};
 use crate::motion3d::model::rows::tangents;
 use crate::motion3d::model::whitening::Whitening;
-use crate::motion3d::robust::CompetingMotion;
-use crate::motion3d::solver::covariance::{determined, direction_deviation};
+use crate::motion3d::solver::covariance::{PLAUSIBLE, determined, direction_deviation};
 use crate::motion3d::solver::likelihood::SAME;
 use crate::motion3d::solver::refine::{MANY, StoppingCriteria, descend};
 use crate::motion3d::solver::smoothing::DepthSmoother;
@@ -57,29 +56,21 @@ pub(crate) fn judge(
     inliers: &Observations,
     solution: &mut Solution,
     unknown: bool,
-    competing: &[CompetingMotion],
+    competing: &[Alternative],
     rng: CounterRng,
 ) {
     let deviation = solution.covariance.map_or(f64::INFINITY, |c| direction_deviation(&c));
     // Where even that is not finite, no other motion is distinct.
     let distinct = (3.0 * if deviation.is_finite() { deviation } else { 0.0 }).to_radians().max(1e-6);
-    let planar = planar(whitening, inliers, solution, unknown, distinct);
+    let twin = planar_twin(whitening, inliers, &solution.motion, distinct, unknown);
+    let twin = twin.map(|twin| Alternative { excess: twin.excess - solution.minimum.equations.behind, ..twin });
+    let twin = twin.filter(|twin| twin.excess < EXCLUDED);
     let turned = opposite(inliers, &solution.motion, rng.stream(0));
-    if let Some((motion, excess)) = turned {
-        solution.alternatives.insert(0, Alternative { motion, excess });
-    }
-    if let Some(other) = solution.undecided {
-        solution.alternatives.retain(|known| known.motion.angle_to(&other.motion) > distinct);
-        solution.alternatives.insert(0, other);
-    }
+    let found = competing.iter().copied().chain(solution.undecided).chain(turned).chain(twin);
     let same = if deviation.is_finite() { deviation.max(SAME) } else { SAME };
-    for (place, competitor) in competing.iter().enumerate() {
-        solution.alternatives.retain(|known| known.motion.angle_to(&competitor.motion).to_degrees() > same);
-        let place = place.min(solution.alternatives.len());
-        solution.alternatives.insert(place, Alternative { motion: competitor.motion, excess: competitor.excess });
-    }
-    once(&mut solution.alternatives);
-    let motions = [solution.motion, solution.likelihood.motion];
+    solution.alternatives = different(found.chain(solution.alternatives.drain(..)), same);
+    let of_likelihood = solution.plugged.as_ref().map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
+    let motions = [solution.motion, solution.minimum.motion];
     let here = equations(inliers, &solution.motion, &solution.tangent, None);
     solution.status = if inliers.n < FEW {
         Status::FewPoints
@@ -90,67 +81,32 @@ pub(crate) fn judge(
     } else if determined(&here.h).is_none() {
         solution.covariance = None;
         Status::IllConditioned
-    } else if planar || !competing.is_empty() {
+    } else if twin.is_some() || !competing.is_empty() {
         Status::Ambiguous
     } else if !solution.described
         || deviation.is_nan()
         || deviation > WIDE
-        || far(inliers, &motions, deviation, solution.likelihood_std, rng.stream(1))
+        || far(inliers, &motions, deviation, of_likelihood, rng.stream(1))
     {
         Status::IllConditioned
     } else if turned.is_some() || solution.undecided.is_some() {
         Status::Ambiguous
-    } else if solution.low {
+    } else if solution.plugged.is_none() {
         Status::LowSnr
     } else {
         Status::Ok
     };
 }
 
-/// Keeps each motion the first time that it comes.
-fn once(alternatives: &mut Vec<Alternative>) {
-    let mut kept: Vec<Alternative> = Vec::with_capacity(alternatives.len());
-    alternatives.retain(|other| {
-        let new = kept.iter().all(|known| known.motion.angle_to(&other.motion).to_degrees() > SAME);
-        kept.extend(new.then_some(*other));
-        new
-    });
-}
-
-/// Whether the points are one plane that has another motion, too; that is then the first alternative.
-fn planar(
-    whitening: &Whitening<'_>,
-    inliers: &Observations,
-    solution: &mut Solution,
-    unknown: bool,
-    distinct: f64,
-) -> bool {
-    let Some(twin) = planar_twin(whitening, inliers, &solution.motion, distinct, unknown) else {
-        return false;
-    };
-    let excess = twin.excess - solution.behind;
-    if excess >= EXCLUDED {
-        return false;
+/// The alternatives without those within `same` degrees of an earlier one.
+fn different(alternatives: impl Iterator<Item = Alternative>, same: f64) -> Vec<Alternative> {
+    let mut kept: Vec<Alternative> = Vec::new();
+    for other in alternatives {
+        if kept.iter().all(|known| known.motion.angle_to(&other.motion).to_degrees() > same) {
+            kept.push(other);
+        }
     }
-    // Found again with the rotation of the first taken out it is the same to some digits only.
-    let same = distinct.max(SAME.to_radians());
-    solution.alternatives.retain(|other| other.motion.angle_to(&twin.motion) > same);
-    solution.alternatives.insert(0, Alternative { motion: twin.motion, excess });
-    true
-}
-
-/// Whether directions explain the flow as well as the estimate that are farther than the covariance has it:
-/// where the cost along a line of directions is curved, the covariance at the minimum is too small.
-///
-/// `own` and `likelihood`: standard deviations of the estimate and of maximum likelihood, whose residuals are
-/// looked at; of the points that the search sees they are that much larger.
-fn far(inliers: &Observations, motions: &[Motion], own: f64, likelihood: f64, rng: CounterRng) -> bool {
-    let fewer = (inliers.n as f64 / inliers.n.min(MANY) as f64).sqrt();
-    let farther = Farther {
-        residuals: FAR * own.max(likelihood.min(MAX_LIKELIHOOD_RATIO * own)) * fewer + SPACING,
-        chance: CONSISTENT * own * fewer + SPACING,
-    };
-    plausible_beyond(inliers, motions, farther, rng)
+    kept
 }
 
 /// Squared standard deviations by which the opposite must be worse to be excluded: a chance of about 1 in
@@ -165,21 +121,18 @@ fn in_front(observations: &Observations, start: &Motion) -> (Motion, f64) {
     (found.motion, found.equations.cost)
 }
 
-/// The opposite of a motion, with the rotation that suits it best and how much less likely it is, in squared
-/// units of noise; `None` where the depths exclude it.
-fn opposite(observations: &Observations, motion: &Motion, rng: CounterRng) -> Option<(Motion, f64)> {
+/// The opposite of a motion, with the rotation that suits it best; `None` where the depths exclude it.
+fn opposite(observations: &Observations, motion: &Motion, rng: CounterRng) -> Option<Alternative> {
     let searched = &*at_most(observations, SEARCHED, rng);
     let [own, opposite] = [*motion, motion.reversed()].map(|start| in_front(searched, &start));
     // One that turned back is no other motion.
     let turned = opposite.0.u().dot(&motion.u()) < 0.0;
     let excess = (opposite.1 - own.1) * observations.n as f64 / searched.n as f64;
-    (turned && excess < SURE).then_some((opposite.0, excess))
+    (turned && excess < SURE).then_some(Alternative { motion: opposite.0, excess })
 }
 
-/// The 0.95 quantile of chi-squared with five degrees of freedom.
-pub(crate) const PLAUSIBLE: f64 = 11.07;
-
-/// That with two: of the equations for a direction, once the rotation suits it.
+/// The 0.95 quantile of chi-squared with two degrees of freedom: of the equations for a direction, once the
+/// rotation suits it.
 const CHI2_OF_DIRECTION: f64 = 5.99;
 
 /// Standard deviations that chance may add to a difference of `J`.
@@ -191,15 +144,6 @@ const AS_SMOOTH: f64 = 1.0;
 /// Most doubtful directions whose depth maps are compared, the likeliest by what else is known of them.
 const COMPARED: usize = 12;
 
-/// Angles to the estimate, degrees, beyond which a direction is tested.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Farther {
-    /// Directions whose residuals are as small.
-    pub residuals: f64,
-    /// Directions whose residuals may be larger by chance.
-    pub chance: f64,
-}
-
 /// A direction with the rotation and the sign that suit it best.
 #[derive(Debug, Clone, Copy)]
 struct TestedDirection {
@@ -210,15 +154,17 @@ struct TestedDirection {
     angle: f64,
 }
 
-/// Whether any direction of the half sphere, farther from that of the first of `motions` (the estimate),
-/// explains the flow of as many points as a search begins with as well as the best of these, depth signs
-/// included. A covariance is that of one minimum; a whole line of minima shows here.
-pub(crate) fn plausible_beyond(
-    observations: &Observations,
-    motions: &[Motion],
-    farther: Farther,
-    rng: CounterRng,
-) -> bool {
+/// Whether any direction of the half sphere that is farther than the covariance has it explains the flow of
+/// as many points as a search begins with as well as the best of the `motions`, the estimate and maximum
+/// likelihood's, depth signs included: where the cost along a line of directions is curved, the covariance at
+/// the minimum is too small.
+///
+/// `own` and `likelihood`: standard deviations of both, degrees (0: not known); of the points that the search
+/// sees they are that much larger.
+fn far(observations: &Observations, motions: &[Motion], own: f64, likelihood: f64, rng: CounterRng) -> bool {
+    let fewer = (observations.n as f64 / observations.n.min(MANY) as f64).sqrt();
+    let beyond = FAR * own.max(likelihood.min(MAX_LIKELIHOOD_RATIO * own)) * fewer + SPACING;
+    let beyond_by_chance = CONSISTENT * own * fewer + SPACING;
     let searched = &*at_most(observations, MANY, rng);
     let first = motions[0].u();
     let known: Vec<TestedDirection> =
@@ -231,11 +177,11 @@ pub(crate) fn plausible_beyond(
         best_rotation(searched, u).filter(|(_, cost)| *cost < widest)?;
         let tested = test_direction(searched, u, &first)?;
         let chance = || CHANCE * fluctuation(searched, &best.motion, &tested.motion);
-        let doubtful = (tested.angle > farther.residuals && tested.cost < limit)
-            || (tested.angle > farther.chance && tested.cost < limit + chance());
+        let doubtful = (tested.angle > beyond && tested.cost < limit)
+            || (tested.angle > beyond_by_chance && tested.cost < limit + chance());
         doubtful.then_some(tested)
     });
-    if doubts.iter().any(|tested| tested.angle > farther.residuals && tested.cost < limit) {
+    if doubts.iter().any(|tested| tested.angle > beyond && tested.cost < limit) {
         return true;
     }
     if !keeps("motion3d.region_by_chance") {

@@ -4,7 +4,7 @@
 
 use super::{over_chunks, symmetric};
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::{CHUNK, Observations, PLANES};
+use crate::motion3d::model::observations::{ALIGN, CHUNK, Observations, PLANES};
 use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::simd::{Kernel, Lanes, dispatch};
 use nalgebra::{Matrix2x3, Matrix3, SVector, Vector3};
@@ -98,7 +98,7 @@ fn add_products<V: Lanes<Scalar = f64>, const N: usize>(sums: &mut [V], d: &[V; 
 fn totals<V: Lanes<Scalar = f64>, const N: usize>(sums: &[V; N]) -> SVector<f64, N> {
     let mut out = SVector::zeros();
     for k in 0..N {
-        let mut values = [0.0; 16];
+        let mut values = [0.0; ALIGN];
         sums[k].store(&mut values[..V::LANES]);
         for value in &values[..V::LANES] {
             out[k] += value;
@@ -228,8 +228,13 @@ pub(crate) fn best_rotation(observations: &Observations, direction: &Vector3<f64
         right += pull;
         cc += square;
     }
-    let w = normal.cholesky()?.solve(&right);
-    let cost = (cc - right.dot(&w)).max(0.0);
+    least_squares(&normal, &right, cc)
+}
+
+/// The solution of normal equations with what it leaves of the sum of squares `square`.
+pub(crate) fn least_squares(normal: &Matrix3<f64>, right: &Vector3<f64>, square: f64) -> Option<(Vector3<f64>, f64)> {
+    let w = normal.cholesky()?.solve(right);
+    let cost = (square - right.dot(&w)).max(0.0);
     (w.iter().all(|value| value.is_finite()) && cost.is_finite()).then_some((w, cost))
 }
 

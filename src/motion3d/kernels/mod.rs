@@ -7,7 +7,7 @@
 
 mod lanes;
 
-pub(crate) use lanes::{Depths, Equations, best_rotation, depths, equations};
+pub(crate) use lanes::{Depths, Equations, best_rotation, depths, equations, least_squares};
 
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{KnownRotation, Observations, Row};

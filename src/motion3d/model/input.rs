@@ -53,16 +53,6 @@ pub enum Placement {
     Start,
 }
 
-/// A screen: where points lie and how their flow is measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Projection {
-    /// The plane at distance 1: `eta = (x, y, 1)`, `nu = 1 / Z`.
-    #[default]
-    Plane,
-    /// The unit sphere: `eta` is the bearing, `nu = 1 / range`.
-    Sphere,
-}
-
 impl Flow<'_> {
     /// Number of points.
     pub fn len(&self) -> usize {
@@ -86,14 +76,6 @@ impl Flow<'_> {
     pub(crate) fn camera(&self) -> Option<&Intrinsics> {
         if let Self::Plane { camera, .. } = self { *camera } else { None }
     }
-    /// The screen.
-    pub fn projection(&self) -> Projection {
-        match self {
-            Self::Plane { .. } => Projection::Plane,
-            Self::Sphere { .. } => Projection::Sphere,
-        }
-    }
-
     pub(crate) fn check(&self, noise: &Noise<'_>) -> Result<()> {
         let flow = match self {
             Self::Plane { flow, .. } => flow.len(),

@@ -7,12 +7,15 @@ use nalgebra::{Matrix2, Matrix2x3, Matrix3, SymmetricEigen, Vector2, Vector3};
 use rayon::prelude::*;
 use std::ops::AddAssign;
 
+/// Unknowns of a motion, and the fewest points that determine them.
+pub(crate) const UNKNOWNS: usize = 5;
+
 /// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A
 /// multiple of every lane count.
 pub(crate) const CHUNK: usize = 4096;
 
-/// Lanes are filled up with points of weight 0 to a multiple of this.
-const ALIGN: usize = 8;
+/// Lanes are filled up with points of weight 0 to a multiple of this, the most lanes.
+pub(crate) const ALIGN: usize = 16;
 
 /// Planes of an [`Observations`].
 pub(crate) const PLANES: usize = 14;
@@ -95,6 +98,11 @@ impl Observations {
         self.prior.map_or(0.0, |known| known.pull(w).1)
     }
 
+    /// The same points where nothing is known of the rotation.
+    pub fn without_prior(&self) -> Self {
+        Self { prior: None, ..self.clone() }
+    }
+
     /// Usable points in the order given; `source` says where they come from. Their sites are left empty.
     pub fn new(rows: &[Row], position: Vec<[f64; 3]>, spherical: bool, source: Vec<u32>) -> Self {
         let n = rows.len();
@@ -153,6 +161,19 @@ impl Observations {
             source: chosen.iter().map(|k| self.source[pick(k)]).collect(),
             ..*self
         }
+    }
+
+    /// Which points are `chosen`, by index among these.
+    pub fn mask(&self, chosen: &[u32]) -> Vec<bool> {
+        let mut mask = vec![false; self.n];
+        chosen.iter().for_each(|&k| mask[k as usize] = true);
+        mask
+    }
+
+    /// The points that are not `chosen`.
+    pub fn others(&self, chosen: &[u32]) -> Vec<u32> {
+        let mask = self.mask(chosen);
+        (0..self.n as u32).filter(|&k| !mask[k as usize]).collect()
     }
 
     /// Every point times the root of its weight.

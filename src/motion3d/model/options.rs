@@ -1,6 +1,6 @@
 //! What is given and how it is worked on.
 
-use super::input::{Flow, Noise, Placement, Projection};
+use super::input::{Flow, Noise, Placement};
 use super::motion::Motion;
 use super::observations::KnownRotation;
 use super::result::{CommonEffect, Moved};
@@ -123,7 +123,7 @@ impl MotionOptions {
             return Err(Error::argument("rotation_prior", expected, format!("{rotation} with {covariance}")));
         }
         self.check_initial()?;
-        self.check_common(flow.projection())?;
+        self.check_common(matches!(flow, Flow::Sphere { .. }))?;
         self.check_correlation(noise)
     }
 
@@ -144,7 +144,7 @@ impl MotionOptions {
     }
 
     /// On the plane or the sphere.
-    pub(crate) fn check_common(&self, projection: Projection) -> Result<()> {
+    pub(crate) fn check_common(&self, is_spherical: bool) -> Result<()> {
         let CommonErrors { scale, offset } = self.systematic_errors();
         if !(0.0..=1.0).contains(&scale) {
             return Err(Error::argument("flow_scale_std", "a number from 0 to 1", scale));
@@ -153,7 +153,7 @@ impl MotionOptions {
         if !(0.0..=1e100).contains(&offset) {
             return Err(Error::argument("flow_bias_std", "a number from 0 to 1e100", offset));
         }
-        if projection == Projection::Sphere && offset > 0.0 {
+        if is_spherical && offset > 0.0 {
             let expected = "0 on the sphere, whose flow has no common displacement";
             return Err(Error::argument("flow_bias_std", expected, offset));
         }
@@ -213,7 +213,16 @@ impl CommonErrors {
             scaled -= covariance.fixed_columns::<3>(2) * (known.information * w);
         }
         let displaced = unit * self.offset;
-        CommonEffect::of(self.scale, &scaled, &displaced, &(moved * displaced))
+        let along = moved * displaced;
+        CommonEffect {
+            scale: self.scale,
+            displaced: [0, 1].map(|k| displaced.column(k).into_owned().into()),
+            motion: [
+                (scaled * self.scale).into(),
+                along.column(0).into_owned().into(),
+                along.column(1).into_owned().into(),
+            ],
+        }
     }
 
     /// What both add to the covariance of a rotation alone; `moved`: what displacements in the unit of the

@@ -211,16 +211,6 @@ pub struct CommonEffect {
 }
 
 impl CommonEffect {
-    pub(crate) fn of(scale: f64, scaled: &Vector5, displaced: &Matrix2<f64>, moved: &Moved) -> Self {
-        let column = |k: usize| moved.column(k).into_owned().into();
-        let displacement = |k: usize| displaced.column(k).into_owned().into();
-        Self {
-            scale,
-            displaced: [displacement(0), displacement(1)],
-            motion: [(scaled * scale).into(), column(0), column(1)],
-        }
-    }
-
     /// What displacements of one standard deviation do to the motion.
     fn moves(&self) -> [Vector5; 3] {
         self.motion.map(SVector::from)

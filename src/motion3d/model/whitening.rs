@@ -8,8 +8,8 @@ use crate::types::Intrinsics;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use rayon::prelude::*;
 
-/// Fewest points that a task whitens.
-const TOGETHER: usize = 1024;
+/// Fewest points of a task.
+pub(crate) const TOGETHER: usize = 1024;
 
 /// What was given, to be whitened as often as another rotation is taken out of its displacements.
 #[derive(Clone)]

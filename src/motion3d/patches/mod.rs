@@ -14,12 +14,11 @@ use crate::error::{Error, Result};
 use crate::math::by_chance;
 use crate::math::random::CounterRng;
 use crate::motion3d::bound::{MotionBound, check_motion, with_known_depth};
-use crate::motion3d::model::input::{
-    Placement, Projection, affine_map, check_covariances, check_lengths, is_positive, to_plane,
-};
+use crate::motion3d::diagnostics::report::likelihood;
+use crate::motion3d::model::input::{Placement, affine_map, check_covariances, check_lengths, is_positive, to_plane};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::options::{Method, MotionOptions};
-use crate::motion3d::model::result::{CommonEffect, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
+use crate::motion3d::model::result::{CommonEffect, MotionEstimate, Status};
 use crate::motion3d::model::rows::{Derotation, tangents};
 use crate::motion3d::model::whitening::floored;
 use crate::motion3d::solver::covariance::{inverse, plugged};
@@ -110,22 +109,18 @@ impl AffinePatches<'_> {
 /// `rotation_prior`, `points_per_independent_sample` and `correlation_length`, which this form does not have.
 pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     patches.check()?;
-    let refuse = |name: &'static str| {
-        Err(Error::argument(name, "its default, as six numbers are given a patch", "another value"))
-    };
-    match options {
-        MotionOptions { robust: true, .. } => return refuse("robust"),
-        MotionOptions { weight_depths: Some(_), .. } => return refuse("weight_inv_depth"),
-        MotionOptions { rotation_prior: Some(_), .. } => return refuse("rotation_prior"),
-        MotionOptions { points_per_independent_sample: Some(points), .. } if *points != 1.0 => {
-            return refuse("points_per_independent_sample");
-        }
-        MotionOptions { correlation_length: Some(length), .. } if *length != 0.0 => {
-            return refuse("correlation_length");
-        }
-        _ => {}
+    let given = |option: Option<f64>, default: f64| option.is_some_and(|value| value != default);
+    let refused = [
+        ("robust", options.robust),
+        ("weight_inv_depth", options.weight_depths.is_some()),
+        ("rotation_prior", options.rotation_prior.is_some()),
+        ("points_per_independent_sample", given(options.points_per_independent_sample, 1.0)),
+        ("correlation_length", given(options.correlation_length, 0.0)),
+    ];
+    if let Some((name, _)) = refused.iter().find(|(_, is_given)| *is_given) {
+        return Err(Error::argument(name, "its default, as six numbers are given a patch", "another value"));
     }
-    options.check_common(Projection::Plane)?;
+    options.check_common(false)?;
     let covariances = floored(patches.covariances.chunks_exact(36).map(Matrix6::from_row_slice).collect());
     let covariances: Vec<f64> = covariances.iter().flat_map(|given| given.as_slice().to_vec()).collect();
     let patches = AffinePatches { covariances: &covariances, ..*patches };
@@ -163,7 +158,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     let improved = if wanted || plugged.is_none() { shrunk(system, &best.motion) } else { None };
     let mut out = MotionEstimate::nothing(n, Status::Ok, 1.0);
     out.fell_back = wanted && improved.is_none();
-    let (mut motion, mut covariance) = (best.motion, plugged.map(|plugged| plugged.likelihood));
+    let (mut motion, mut covariance) = (best.motion, plugged.as_ref().map(|plugged| plugged.likelihood));
     let mut surfaces = None;
     if let Some(found) = improved {
         if wanted {
@@ -183,12 +178,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     covariance = covariance.map(|covariance| covariance * wider + out.common.added());
     let low = plugged.is_none() || wider > NONLINEAR;
     report_motion(&mut out, system, &motion, covariance, surfaces.as_deref());
-    out.likelihood = Likelihood {
-        motion: best.motion,
-        covariance: plugged.map_or(UNKNOWN, |plugged| nested(&plugged.likelihood)),
-        tangent: axes(&best.tangent),
-        cost: best.equations.cost,
-    };
+    out.likelihood = likelihood(best, plugged.as_ref());
     // Patches at one place determine no more surfaces than one of less noise.
     let place = |&k: &u32| patches.points[k as usize].map(f64::to_bits);
     let places = system.source.iter().map(place).collect::<HashSet<_>>().len();

@@ -8,10 +8,9 @@
 use super::system::System;
 use crate::math::quantile;
 use crate::math::random::CounterRng;
-use crate::motion3d::diagnostics::status::PLAUSIBLE;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::rows::{Matrix5, tangents};
-use crate::motion3d::solver::covariance::{inverse, plugged};
+use crate::motion3d::solver::covariance::{PLAUSIBLE, inverse, plugged};
 use crate::motion3d::solver::efficient::{FARTHEST, ROUNDS};
 use nalgebra::{Matrix3, Vector3, Vector6};
 use rayon::prelude::*;

@@ -1,7 +1,7 @@
 //! Whitened patches and the sums over them, as those of points.
 
 use crate::motion3d::diagnostics::rotation::RotationOnly;
-use crate::motion3d::kernels::Equations;
+use crate::motion3d::kernels::{Equations, least_squares};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::result::Moved;
 use crate::motion3d::model::rows::{AffineRows, Derotation, Matrix5, Vector5, tangents};
@@ -199,22 +199,12 @@ impl System {
             right += weighted * patch.f;
             square += patch.f.dot(&(across * patch.f));
         }
-        let w = normal.cholesky()?.solve(&right);
-        let cost = (square - right.dot(&w)).max(0.0);
-        (w.iter().all(|value| value.is_finite()) && cost.is_finite()).then_some((w, cost))
+        least_squares(&normal, &right, square)
     }
 
     /// The rotation that explains the flow best without a translation.
     pub fn rotation_only(&self) -> Option<RotationOnly> {
-        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        for patch in &self.patches {
-            normal += patch.r.tr_mul(&patch.r);
-            right += patch.r.tr_mul(&patch.f);
-        }
-        let factor = normal.cholesky()?;
-        let rotation = factor.solve(&right);
-        let chi2 = self.patches.iter().map(|patch| (patch.f - patch.r * rotation).norm_squared()).sum();
-        Some(RotationOnly { rotation, covariance: factor.inverse(), chi2 })
+        RotationOnly::of_rows(self.patches.iter().map(|patch| (patch.r, patch.f)), None)
     }
 
     /// The minimum that is reached from `start`.

@@ -7,18 +7,19 @@
 use super::depth_consistency::{Cells, DepthConsistency, Judged};
 use super::outlier_posterior::{posterior, weighted};
 use super::search::{graduated, robust_motions};
-use super::{APART, Candidates, CompetingMotion, INLIER, MAJORITY, STOPPING, cheaper_sign, inliers_of, truncated};
+use super::two_motions::MIN_TESTED;
+use super::{APART, Candidates, INLIER, MAJORITY, cheaper_sign, inliers_of, settle, truncated};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::equations;
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::observations::{Observations, UNKNOWNS};
 use crate::motion3d::model::options::Smoother;
+use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::rows::tangents;
 use crate::motion3d::solver::covariance::{direction_deviation, inverse};
 use crate::motion3d::solver::efficient::solve;
 use crate::motion3d::solver::likelihood::cost_of;
 use crate::motion3d::solver::profile_likelihood::ROUND;
-use crate::motion3d::solver::refine::refine;
 use crate::motion3d::solver::smoothing::DepthSmoother;
 use crate::motion3d::solver::starts::{at_most, sample};
 use rayon::prelude::*;
@@ -40,7 +41,7 @@ pub(crate) fn among_many_outliers(
     on: &Observations,
     gate: &DepthConsistency<'_>,
     candidates: &[(Motion, f64)],
-) -> Option<(Motion, Vec<CompetingMotion>)> {
+) -> Option<(Motion, Vec<Alternative>)> {
     let cells = Cells::new(on);
     let own = DepthConsistency::new(on, &cells);
     let refined = candidates.par_iter().filter_map(|(motion, _)| {
@@ -54,14 +55,14 @@ pub(crate) fn among_many_outliers(
     let most = found.iter().map(|(_, _, inliers)| inliers.len()).max()?;
     let scene = found.iter().position(|(_, _, inliers)| inliers.len() as f64 > most as f64 - majority)?;
     let (best, cost, own) = found.remove(scene);
-    let mut competing: Vec<CompetingMotion> = Vec::new();
+    let mut competing: Vec<Alternative> = Vec::new();
     for (motion, other, inliers) in &found {
         let alone = inliers.iter().filter(|k| own.binary_search(k).is_err()).count() as f64;
         let as_many = alone > majority && inliers.len() as f64 > own.len() as f64 - majority;
         let as_likely = *other < cost + UNDECIDED * (on.n as f64).sqrt();
         let same = |known: &Motion| known.angle_to(motion).to_degrees() < APART;
         if (as_many || as_likely) && !same(&best) && !competing.iter().any(|competitor| same(&competitor.motion)) {
-            competing.push(CompetingMotion { motion: *motion, excess: (other - cost).max(0.0) });
+            competing.push(Alternative { motion: *motion, excess: (other - cost).max(0.0) });
         }
     }
     let best = if on.n == observations.n { best } else { refined_by_posterior(observations, gate, best)?.0 };
@@ -82,8 +83,7 @@ fn refined_by_posterior(all: &Observations, gate: &DepthConsistency<'_>, start: 
     let (mut motion, mut rounds) = (start, 0..MAX_UPDATES);
     loop {
         let inliers = inliers_of(all, &motion);
-        let Judged { outliers, smooth, cost } =
-            gate.judged(&motion, &inliers).filter(|_| inliers.len() >= super::MIN_POINTS)?;
+        let Judged { outliers, smooth, cost } = gate.judged(&motion, &inliers).filter(|_| inliers.len() >= UNKNOWNS)?;
         if rounds.next().is_none() {
             return Some((motion, cost));
         }
@@ -100,8 +100,7 @@ fn refined_by_posterior(all: &Observations, gate: &DepthConsistency<'_>, start: 
 /// they are so many that they may be the scene. All starts of the first search may end at the motion of one
 /// object.
 pub(crate) fn second(observations: &Observations, best: Motion, rng: CounterRng) -> Option<(Motion, f64)> {
-    let inliers = inliers_of(observations, &best);
-    let rejected: Vec<u32> = (0..observations.n as u32).filter(|k| inliers.binary_search(k).is_err()).collect();
+    let rejected = observations.others(&inliers_of(observations, &best));
     if rejected.len() < MIN_REJECTED || (rejected.len() as f64) < MAJORITY * observations.n as f64 {
         return None;
     }
@@ -115,24 +114,21 @@ pub(crate) fn second(observations: &Observations, best: Motion, rng: CounterRng)
 
 /// Of the candidates, cheapest first, those that have fewer inliers than the first only because other points
 /// fit them.
-pub(crate) fn competing_motions(observations: &Observations, candidates: &[(Motion, f64)]) -> Vec<CompetingMotion> {
+pub(crate) fn competing_motions(observations: &Observations, candidates: &[(Motion, f64)]) -> Vec<Alternative> {
     let (majority, best) = (MAJORITY * observations.n as f64, candidates[0]);
     let inliers_of_best = inliers_of(observations, &best.0);
     let limit = best.1 + INLIER * INLIER * majority;
-    let mut found: Vec<CompetingMotion> = Vec::new();
+    let mut found: Vec<Alternative> = Vec::new();
     for (motion, cost) in candidates.iter().skip(1).take_while(|(_, cost)| *cost < limit) {
         let same = |other: &Motion| other.angle_to(motion).to_degrees() < APART;
         let inliers = inliers_of(observations, motion);
         let new = inliers.iter().filter(|k| inliers_of_best.binary_search(k).is_err()).count() as f64;
         if new > majority && !same(&best.0) && !found.iter().any(|competitor| same(&competitor.motion)) {
-            found.push(CompetingMotion { motion: *motion, excess: cost - best.1 });
+            found.push(Alternative { motion: *motion, excess: cost - best.1 });
         }
     }
     found
 }
-
-/// Fewer points have no regions.
-const MIN_REGIONAL: usize = 50;
 
 /// The share of the points that the first motion must fit: else the object is seen already.
 const MIN_FITTED: f64 = 0.85;
@@ -153,10 +149,9 @@ const MAX_SAME: f64 = 2.5;
 /// By how much, in units of `sqrt(n)`, the depth map of the other motion may be less likely.
 const MAX_ROUGHER: f64 = 1.0;
 
-/// Points and starts of the search outside of one region, and refinements of what it finds.
+/// Points and starts of the search outside of one region.
 const SEARCHED: usize = 200;
 const STARTS: usize = 2;
-const ROUNDS: usize = 3;
 
 /// The motion of the points outside of one region, where it differs from `best`, which fits nearly all
 /// points.
@@ -166,9 +161,9 @@ pub(crate) fn hidden_object(
     best: &Motion,
     candidates: &Candidates,
     rng: CounterRng,
-) -> Option<CompetingMotion> {
+) -> Option<Alternative> {
     let fitted = inliers_of(observations, best);
-    if observations.n < MIN_REGIONAL || (fitted.len() as f64) < MIN_FITTED * observations.n as f64 {
+    if observations.n < MIN_TESTED || (fitted.len() as f64) < MIN_FITTED * observations.n as f64 {
         return None;
     }
     let at = equations(observations, best, &tangents(&best.u()), None);
@@ -185,7 +180,7 @@ pub(crate) fn hidden_object(
         .into_iter()
         .filter_map(|motion| of_scene(observations, motion))
         .filter(|(motion, scene)| {
-            motion.angle_to(best).to_degrees() > distinct && is_one_region(cells, &fitted, scene, observations.n)
+            motion.angle_to(best).to_degrees() > distinct && is_one_region(observations, cells, &fitted, scene)
         })
         .collect();
     others.sort_by_key(|(_, scene)| std::cmp::Reverse(scene.len()));
@@ -196,46 +191,34 @@ pub(crate) fn hidden_object(
     };
     let (motion, _) = others.iter().find(likely)?;
     let excess = truncated(observations, motion, INLIER) - truncated(observations, best, INLIER);
-    Some(CompetingMotion { motion: *motion, excess: excess.max(0.0) })
+    Some(Alternative { motion: *motion, excess: excess.max(0.0) })
 }
 
 /// Motions that a search without the points of a `region` finds.
 fn outside(observations: &Observations, region: &[u32], rng: CounterRng) -> Vec<Motion> {
-    let mut is_inside = vec![false; observations.n];
-    for &k in region {
-        is_inside[k as usize] = true;
-    }
-    let rest: Vec<u32> = (0..observations.n as u32).filter(|&k| !is_inside[k as usize]).collect();
-    let rest = observations.subset(&rest);
+    let rest = observations.subset(&observations.others(region));
     let rest = &*at_most(&rest, SEARCHED, rng.stream(1));
     let found = robust_motions(rest, STARTS, rng);
     found.into_iter().map(|motion| cheaper_sign(rest, motion).0).collect()
 }
 
 /// The motion refined on the points that it fits, and these; `None` where they are too few for a scene.
-fn of_scene(observations: &Observations, mut motion: Motion) -> Option<(Motion, Vec<u32>)> {
-    let least = MIN_SCENE * observations.n as f64;
-    let mut fitted = inliers_of(observations, &motion);
-    for _ in 0..ROUNDS {
-        if (fitted.len() as f64) < least {
-            return None;
-        }
-        motion = refine(&observations.subset(&fitted), motion, STOPPING).motion;
-        fitted = inliers_of(observations, &motion);
+fn of_scene(observations: &Observations, motion: Motion) -> Option<(Motion, Vec<u32>)> {
+    let enough = |inliers: &[u32]| inliers.len() as f64 >= MIN_SCENE * observations.n as f64;
+    if !enough(&inliers_of(observations, &motion)) {
+        return None;
     }
-    (fitted.len() as f64 >= least).then_some((motion, fitted))
+    let found = settle(observations, motion)?;
+    enough(&found.inliers).then_some((found.motion, found.inliers))
 }
 
 /// Whether the points that only the first motion fits lie together, as those of an object do.
-fn is_one_region(cells: &Cells, fitted: &[u32], scene: &[u32], n: usize) -> bool {
-    let mut is_scene = vec![false; n];
-    for &k in scene {
-        is_scene[k as usize] = true;
-    }
+fn is_one_region(observations: &Observations, cells: &Cells, fitted: &[u32], scene: &[u32]) -> bool {
+    let is_scene = observations.mask(scene);
     let rejected = cells.rejected(&is_scene);
     let lost: Vec<f64> = fitted.iter().filter(|&&k| !is_scene[k as usize]).map(|&k| rejected[k as usize]).collect();
     let coherence = lost.iter().sum::<f64>() / lost.len().max(1) as f64;
-    (lost.len() as f64) < MAX_OBJECT * n as f64 && coherence > MIN_COHERENCE
+    (lost.len() as f64) < MAX_OBJECT * observations.n as f64 && coherence > MIN_COHERENCE
 }
 
 /// By how much the second motion with its depths is less likely on the points of the scene than the first, in

@@ -59,10 +59,7 @@ impl<'a> DepthConsistency<'a> {
         }
         let seen = depths(self.observations, motion);
         let near = near(self.observations, &seen);
-        let mut is_inlier = vec![false; self.observations.n];
-        for &k in inliers {
-            is_inlier[k as usize] = true;
-        }
+        let is_inlier = self.observations.mask(inliers);
         let differences = within_cells(self.cells, &near, &is_inlier, &seen);
         let (deviations, scene) = deviations(&near, &differences, &is_inlier, &seen);
         let n = self.observations.n;

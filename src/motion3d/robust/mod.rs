@@ -21,11 +21,12 @@ use crate::ablation::keeps;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::{Observations, Scaled};
+use crate::motion3d::model::observations::{Observations, Scaled, UNKNOWNS};
+use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::finite_rotation::changes_inliers;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
-use crate::motion3d::solver::starts::at_most;
+use crate::motion3d::solver::starts::{SEARCHED, STARTS, at_most};
 use competing_motions::{among_many_outliers, competing_motions, hidden_object, second};
 use depth_consistency::{Cells, DepthConsistency};
 pub(crate) use noise::{CUT_INFORMATION, has_high_leverage, larger, one_noise};
@@ -38,12 +39,8 @@ use std::borrow::Cow;
 /// far.
 const INLIER: f64 = 3.0;
 
-/// Starts that are refined, and the least angle between them, degrees.
-const STARTS: usize = 5;
+/// The least angle between different motions, degrees.
 const APART: f64 = 10.0;
-
-/// Most points that a search looks at.
-const SEARCHED: usize = 1000;
 
 /// When a motion of a set of inliers that is not final is reached.
 const STOPPING: StoppingCriteria = StoppingCriteria { steps: 60, tolerance: 1e-10, deviations: 1e-2 };
@@ -63,15 +60,9 @@ const DEPTH_ROUNDS: usize = 2;
 /// Share of outliers among the inliers from which on they matter for the search.
 const MATTER: f64 = 0.03;
 
-/// Fewest points that a motion is found from.
-const MIN_POINTS: usize = 5;
-
 /// Two motions of different points of which neither has a tenth of all points more than the other: which is
 /// the scene's is undecided.
 const MAJORITY: f64 = 0.1;
-
-/// What residuals that estimate noise are fewer by: the unknowns of a motion.
-const UNKNOWNS: usize = 5;
 
 /// Below so many points a few of them can agree by chance far better than the noise of all is: see
 /// [`single_noise`].
@@ -88,7 +79,7 @@ pub(crate) struct Consensus {
     pub inliers: Vec<u32>,
     /// Other motions with about as many inliers, and how much more each costs, in squared units of noise;
     /// the best first.
-    pub competing: Vec<CompetingMotion>,
+    pub competing: Vec<Alternative>,
     /// Of few points whose outliers are not believed: by how much, in nats, these would shorten the
     /// description of the residuals.
     pub shorter: Option<f64>,
@@ -104,13 +95,6 @@ impl Consensus {
     }
 }
 
-/// Another motion, of other points.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct CompetingMotion {
-    pub motion: Motion,
-    pub excess: f64,
-}
-
 /// Candidates for the motion with the most inliers, each with its truncated cost; the cheapest first.
 type Candidates = Vec<(Motion, f64)>;
 
@@ -118,8 +102,15 @@ type Candidates = Vec<(Motion, f64)>;
 /// estimated, and the points are measured in it afterwards. A rotation is taken out of displacements where
 /// that changes the inliers.
 pub(crate) fn consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
-    let found = with_noise(whitening, scaled, rng)?;
-    Some(with_doubts(&scaled.observations, found, rng))
+    let mut found = with_noise(whitening, scaled, rng)?;
+    // Errors that go together look like other motions everywhere.
+    if scaled.observations.independent && keeps("motion3d.residual_structure") {
+        let on = search_sample(&scaled.observations, rng);
+        let inliers = inliers_of(&on, &found.motion);
+        let inliers = if on.n == scaled.observations.n { &found.inliers } else { &inliers };
+        found.competing.extend(two_motions::competing_motion(&on, &found.motion, inliers, rng));
+    }
+    Some(found)
 }
 
 fn with_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
@@ -189,7 +180,7 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
     let gate = DepthConsistency::new(observations, &cells);
     for _ in 0..if keeps("motion3d.depth_gate") { DEPTH_ROUNDS } else { 0 } {
         let (kept, _) = gate.passed(&found);
-        if kept.len() < MIN_POINTS || kept.len() == found.inliers.len() {
+        if kept.len() < UNKNOWNS || kept.len() == found.inliers.len() {
             break;
         }
         let motion = refine(&observations.subset(&kept), found.motion, STOPPING).motion;
@@ -203,36 +194,17 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
         competing = others;
     }
     found.competing = competing;
-    if inliers.len() >= MIN_POINTS {
+    if inliers.len() >= UNKNOWNS {
         found.inliers = inliers;
         found.outliers = outliers.filter(|_| keeps("motion3d.outlier_mixture"));
     }
-    if found.inliers.len() < MIN_POINTS {
+    if found.inliers.len() < UNKNOWNS {
         return None;
     }
     if keeps("motion3d.hidden_object") && observations.independent {
-        let own;
-        let cells = if on.n == observations.n {
-            &cells
-        } else {
-            own = Cells::new(on);
-            &own
-        };
-        found.competing.extend(hidden_object(on, cells, &found.motion, &candidates, rng.stream(11)));
+        found.competing.extend(hidden_object(on, &Cells::new(on), &found.motion, &candidates, rng.stream(11)));
     }
     Some(found)
-}
-
-/// The same with the motion that it may be instead.
-fn with_doubts(observations: &Observations, mut found: Consensus, rng: CounterRng) -> Consensus {
-    // Errors that go together look like other motions everywhere.
-    if !observations.independent || !keeps("motion3d.residual_structure") {
-        return found;
-    }
-    let on = search_sample(observations, rng);
-    let shown = if on.n == observations.n { found.inliers.clone() } else { inliers_of(&on, &found.motion) };
-    found.competing.extend(two_motions::competing_motion(&on, &found.motion, &shown, rng));
-    found
 }
 
 /// The points that a search begins with.
@@ -279,7 +251,7 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
     let mut motion = start;
     let mut inliers = inliers_of(observations, &motion);
     for _ in 0..ROUNDS {
-        if inliers.len() < MIN_POINTS {
+        if inliers.len() < UNKNOWNS {
             return None;
         }
         motion = refine(&observations.subset(&inliers), motion, STOPPING).motion;
@@ -292,5 +264,5 @@ fn settle(observations: &Observations, start: Motion) -> Option<Consensus> {
             break;
         }
     }
-    (inliers.len() >= MIN_POINTS).then_some(Consensus::new(motion, inliers))
+    (inliers.len() >= UNKNOWNS).then_some(Consensus::new(motion, inliers))
 }

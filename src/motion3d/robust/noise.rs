@@ -4,13 +4,13 @@
 //! One motion of all points in larger noise may be as good an explanation as one of the points that happen to
 //! agree.
 
-use super::{Consensus, INLIER, UNKNOWNS};
+use super::{Consensus, INLIER};
 use crate::ablation::keeps;
 use crate::math::median;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{depths, slopes};
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::observations::{Observations, UNKNOWNS};
 use crate::motion3d::model::result::MotionEstimate;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::model::whitening::Whitening;

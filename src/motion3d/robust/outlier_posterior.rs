@@ -16,6 +16,7 @@ use crate::motion3d::kernels::{depths, information};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::{Matrix5, carried};
+use crate::motion3d::solver::covariance::PLAUSIBLE;
 use crate::motion3d::solver::efficient::solve;
 use nalgebra::Matrix2x3;
 use std::borrow::Cow;
@@ -37,9 +38,6 @@ const BINS: usize = 2 * SIZES;
 
 /// The least odds of outliers: one for a million of inliers.
 const MIN_ODDS: f64 = 1e-6;
-
-/// The bin of points that are in none.
-const NONE: u8 = u8::MAX;
 
 /// Bins from here on are odd enough to be left out where outliers are the most of them.
 const TAIL: usize = 4;
@@ -71,7 +69,8 @@ pub(crate) struct Odds {
 /// The odds of all points.
 #[derive(Debug, Clone)]
 pub(crate) struct OutlierPosterior {
-    bins: Vec<u8>,
+    /// Of each point that was counted.
+    bins: Vec<Option<u8>>,
     odds: [Odds; BINS],
     dropped: [bool; BINS],
     /// The share of outliers among all inliers that are kept.
@@ -129,11 +128,11 @@ impl OutlierPosterior {
     /// Counts points with residuals up to the end of the band; `far` of all `n` have residuals that no inlier
     /// has.
     pub fn new(n: usize, far: usize, points: impl Iterator<Item = Bin>) -> Self {
-        let mut bins = vec![NONE; n];
+        let mut bins = vec![None; n];
         let (mut fitted, mut beside) = ([0usize; BINS], [0usize; BINS]);
         for point in points {
             let place = bin(point.deviation);
-            bins[point.point as usize] = place as u8;
+            bins[point.point as usize] = Some(place as u8);
             fitted[place] += usize::from(point.is_inlier);
             beside[place] += usize::from(BAND.contains(&point.residual.abs()));
         }
@@ -170,20 +169,15 @@ impl OutlierPosterior {
 
     /// Whether outliers do not explain points like this one.
     pub fn keeps(&self, k: u32) -> bool {
-        let bin = self.bins[k as usize];
-        bin != NONE && !self.dropped[bin as usize]
+        self.bins[k as usize].is_some_and(|bin| !self.dropped[bin as usize])
     }
 
     /// The odds of a point; `None` where it is farther from its line than any that was counted, or outliers
     /// explain it.
     pub fn of(&self, k: usize) -> Option<Odds> {
-        let bin = self.bins[k];
-        (bin != NONE).then(|| self.odds[bin as usize]).filter(|odds| odds.outliers.is_finite())
+        self.bins[k].map(|bin| self.odds[bin as usize]).filter(|odds| odds.outliers.is_finite())
     }
 }
-
-/// The square of all steps, in standard deviations, from which on they lead to another motion.
-const FARTHEST: f64 = 11.0;
 
 /// Times that the probabilities are updated on the way to a root, and a change of the direction, rad, that
 /// is not worth another.
@@ -244,7 +238,7 @@ pub(crate) fn weighted_by_posterior(
     let before = information(&inner, from, tangent, &own, 0.0).cholesky()?.l().transpose();
     let near = |motion: &Motion| {
         let off = motion.offset(from, tangent);
-        off.dot(&(informed(from, tangent) * off)) < FARTHEST
+        off.dot(&(informed(from, tangent) * off)) < PLAUSIBLE
     };
     let motion = if moves { root().filter(near).unwrap_or(*from) } else { *from };
     let axes = carried(tangent, &motion.u());

@@ -4,7 +4,7 @@
 use super::{APART, INLIER};
 use crate::math::random::CounterRng;
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::{LESS_ROUND, Observations};
+use crate::motion3d::model::observations::{ALIGN, LESS_ROUND, Observations};
 use crate::motion3d::solver::refine::{StoppingCriteria, refine_cut};
 use crate::motion3d::solver::starts::{apart, evaluate, sample};
 use crate::simd::{Kernel, Lanes, dispatch};
@@ -15,9 +15,6 @@ use std::iter::once;
 /// Points that the search looks at, and samples of three of them.
 const SEARCHED: usize = 400;
 const SAMPLES: usize = 100;
-
-/// Lanes are filled up to a multiple of this.
-const ALIGN: usize = 16;
 
 /// Residuals `(c - q . w)` of one direction, in units of their bounds, as planes `q_x, q_y, q_z, c`.
 struct TruncatedCost<'a> {
@@ -42,7 +39,7 @@ impl Kernel<f64> for TruncatedCost<'_> {
                 let rest = V::load(&z[i..]).neg_mul_add(wz, rest);
                 sum = sum + (rest * rest).min(cut2);
             }
-            let mut lanes = [0.0; 16];
+            let mut lanes = [0.0; ALIGN];
             sum.store(&mut lanes[..V::LANES]);
             let cost: f64 = lanes[..V::LANES].iter().sum();
             if best.is_none_or(|(_, least)| cost < least) {

@@ -4,20 +4,21 @@
 //! of each pull the estimate another way: a score test of parts of the picture shows it.
 
 use super::search::robust_motions;
-use super::{APART, CompetingMotion, INLIER, MIN_POINTS, cheaper_sign, truncated};
+use super::{APART, INLIER, cheaper_sign, truncated};
 use crate::math::chi2_deviation;
 use crate::math::kd_tree::{Neighbours, Tree};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{depths, slopes};
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::observations::{Observations, UNKNOWNS};
+use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use nalgebra::SymmetricEigen;
 use std::ops::Range;
 
-/// Minimum number of points for the test.
-const MIN_TESTED: usize = 50;
+/// Minimum number of points that are tested for a second motion.
+pub(crate) const MIN_TESTED: usize = 50;
 
 /// Residuals whose mean square, in units of noise, is less than this do not matter.
 const LITTLE: f64 = 0.25;
@@ -43,7 +44,7 @@ pub(crate) fn competing_motion(
     found: &Motion,
     points: &[u32],
     rng: CounterRng,
-) -> Option<CompetingMotion> {
+) -> Option<Alternative> {
     let parts = deviating_parts(observations, found, points)?;
     let own = observations.subset(points);
     let (n, together) = (own.n as f64, refine(&own, *found, StoppingCriteria::FULL).equations.cost);
@@ -59,7 +60,7 @@ pub(crate) fn competing_motion(
     let [more, fewer] = &two.motions;
     let motion = Some(more).filter(another).or_else(|| Some(fewer).filter(another).filter(|_| gain > EACH * n))?;
     let excess = truncated(observations, motion, INLIER) - truncated(observations, found, INLIER);
-    (gain > ALL).then(|| CompetingMotion { motion: *motion, excess: excess.max(0.0) })
+    (gain > ALL).then(|| Alternative { motion: *motion, excess: excess.max(0.0) })
 }
 
 /// The smallest parts, as a share of the points, and the fewest points of one.
@@ -133,9 +134,6 @@ fn score_deviation(share: Matrix5, pull: &Vector5, variance: f64) -> f64 {
 /// Neighbours that decide with a point which motion it has: moving objects are connected.
 const NEAREST: usize = 8;
 
-/// What a point counts at most: neighbours across the border of an object do not decide.
-const MAX_SQUARE: f64 = INLIER * INLIER;
-
 /// Times that points are given to the motion that they fit, and that both are searched again from all
 /// directions.
 const ROUNDS: usize = 8;
@@ -167,15 +165,12 @@ impl Division {
     /// The division that is reached from a `part` (by index) and the rest, both of which move as `start` or
     /// nearly so; `None` where one of both loses its points.
     pub fn from(&self, part: &[u32], start: &Motion, rng: CounterRng) -> Option<TwoMotionFit> {
-        let mut second = vec![false; self.points.n];
-        for &k in part {
-            second[k as usize] = true;
-        }
+        let mut second = self.points.mask(part);
         let mut motions = [*start; 2];
         for round in 0..ROUNDS {
             for (own, motion) in motions.iter_mut().enumerate() {
                 let members = self.points.subset(&chosen(&second, own == 1));
-                if members.n <= MIN_POINTS.max(NEAREST) {
+                if members.n <= UNKNOWNS.max(NEAREST) {
                     return None;
                 }
                 *motion = if round < SEARCHES {
@@ -191,7 +186,7 @@ impl Division {
             second = next;
         }
         let members = [false, true].map(|own| self.points.subset(&chosen(&second, own)));
-        if members.iter().any(|members| members.n <= MIN_POINTS) {
+        if members.iter().any(|members| members.n <= UNKNOWNS) {
             return None;
         }
         let fitted: [_; 2] = std::array::from_fn(|own| refine(&members[own], motions[own], StoppingCriteria::FULL));
@@ -205,9 +200,11 @@ impl Division {
     fn nearer(&self, motions: &[Motion; 2]) -> Vec<bool> {
         let [first, second] = motions.each_ref().map(|motion| depths(&self.points, motion).e);
         let order = self.tree.order();
+        // Neighbours across the border of an object do not decide.
+        let square = |e: f64| e.powi(2).min(INLIER * INLIER);
         let gain = |place: u32| {
             let k = order[place as usize] as usize;
-            first[k].powi(2).min(MAX_SQUARE) - second[k].powi(2).min(MAX_SQUARE)
+            square(first[k]) - square(second[k])
         };
         let mut out = vec![false; self.points.n];
         for place in 0..self.points.n as u32 {

@@ -14,6 +14,9 @@ const MIN_INFORMATION_RATIO: f64 = 1e-3;
 /// of half a degree leaves a million times as much.
 pub(crate) const DETERMINED: f64 = 1e-12;
 
+/// The 0.95 quantile of chi-squared with five degrees of freedom.
+pub(crate) const PLAUSIBLE: f64 = 11.07;
+
 /// What the data say about the covariance of maximum likelihood and the bound.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PluginCovariances {

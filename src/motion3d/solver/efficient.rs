@@ -2,7 +2,7 @@
 
 use super::covariance::{PluginCovariances, damping, direction_deviation, inverse};
 use super::profile_likelihood::{ProfileLikelihood, among};
-use super::refine::Minimum;
+use super::refine::{Minimum, root};
 use super::smoothing::{DepthSmoother, Smoothed};
 use crate::motion3d::kernels::{Bilinear, depths, information, slope};
 use crate::motion3d::model::motion::Motion;
@@ -18,10 +18,6 @@ const SETTLED: f64 = 0.001;
 
 /// The farthest that the direction may come from where it began, degrees.
 pub(crate) const FARTHEST: f64 = 30.0;
-
-/// Most Newton steps, and the length of one that is the last.
-const STEPS: usize = 30;
-const STEP: f64 = 1e-11;
 
 /// The solution of the estimating equation.
 #[derive(Debug, Clone)]
@@ -60,7 +56,7 @@ pub(crate) enum WeightDepths<'a> {
 }
 
 impl WeightDepths<'_> {
-    pub fn at(&mut self, observations: &Observations, motion: &Motion) -> Smoothed {
+    fn at(&mut self, observations: &Observations, motion: &Motion) -> Smoothed {
         match self {
             Self::Smoothed(smoother) => smoother.smooth(&depths(observations, motion)),
             Self::Known(nu) => Smoothed { nu: nu.clone(), share: vec![0.0; nu.len()], variance: Vec::new() },
@@ -96,20 +92,16 @@ pub(crate) fn efficient(
     start: &Motion,
     mut weights: WeightDepths<'_>,
 ) -> Option<Efficient> {
+    let unit = weights.unit(observations, start)?;
     let mut motion = *start;
     let mut smooth = weights.at(observations, &motion);
-    let unit = weights.unit(observations, start)?;
     for round in 0..ROUNDS {
         if round > 0 {
             smooth = weights.at(observations, &motion);
         }
+        smooth.nu.iter_mut().for_each(|nu| *nu *= unit);
         let before = motion;
-        motion = if unit == 1.0 {
-            solve(observations, &before, &smooth.nu)?
-        } else {
-            let scaled: Vec<f64> = smooth.nu.iter().map(|nu| unit * nu).collect();
-            solve(observations, &before, &scaled)?
-        };
+        motion = solve(observations, &before, &smooth.nu)?;
         if motion.angle_to(start).to_degrees() > FARTHEST {
             return None;
         }
@@ -117,16 +109,15 @@ pub(crate) fn efficient(
             break;
         }
     }
-    let (tangent, known) = (tangents(&motion.u()), matches!(weights, WeightDepths::Known(_)));
-    let scaled: Vec<f64>;
-    let nu = if unit == 1.0 {
-        &smooth.nu
-    } else {
-        scaled = smooth.nu.iter().map(|nu| unit * nu).collect();
-        &scaled
+    let Smoothed { nu: smooth, share, variance } = smooth;
+    let tangent = tangents(&motion.u());
+    let share = matches!(weights, WeightDepths::Smoothed(_)).then_some(&share[..]);
+    let covariance = sandwich(observations, &motion, &tangent, &smooth, share)?;
+    let (smooth, variance) = match weights {
+        WeightDepths::Smoothed(_) => (smooth, Some(variance)),
+        WeightDepths::Known(given) => (given, None),
     };
-    let covariance = sandwich(observations, &motion, &tangent, nu, (!known).then_some(&smooth.share[..]))?;
-    Some(Efficient { motion, tangent, covariance, smooth: smooth.nu, variance: (!known).then_some(smooth.variance) })
+    Some(Efficient { motion, tangent, covariance, smooth, variance })
 }
 
 /// Without a solution: the covariance at `motion` by depths smoothed there.
@@ -185,20 +176,8 @@ pub(crate) fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> 
     let tangent = tangents(&start.u());
     let spread = damping(observations, start, &tangent, nu)?;
     let equation = Bilinear::new(observations, start, &tangent, nu, spread);
-    let mut motion = *start;
-    for _ in 0..STEPS {
-        let tangent = tangents(&motion.u());
-        let (value, slope) = equation.at(&motion, &tangent);
-        let step = slope.lu().solve(&-value)?;
-        if !step.iter().all(|value| value.is_finite()) {
-            return None;
-        }
-        motion = motion.stepped(&tangent, &step);
-        if step.norm() < STEP {
-            return Some(motion);
-        }
-    }
-    None
+    let at = |motion: &Motion| equation.at(motion, &tangents(&motion.u()));
+    root(*start, at, |motion, step| motion.stepped(&tangents(&motion.u()), step))
 }
 
 /// By how much the standard deviation of (17) must be above the bound's for the noise of the depths to

@@ -14,7 +14,7 @@ use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::rows::tangents;
 use rayon::prelude::*;
 
-/// Most minima of few points that are followed on all.
+/// Most minima of few points that are followed on all, and from which smoothed weights are tried.
 const FINALISTS: usize = 3;
 
 /// Solutions nearer than so many standard deviations are one.
@@ -121,9 +121,6 @@ pub(crate) fn choose(
     (rivals, Some(smoother))
 }
 
-/// Most minima from which smoothed weights are tried.
-const TRIED: usize = 3;
-
 /// Two solutions whose costs, which fluctuate by about `2 sqrt(n)`, differ by less than this times `sqrt(n)`
 /// are as likely.
 const UNDECIDED: f64 = 1.5;
@@ -137,7 +134,7 @@ pub(crate) fn smoothed(
     candidates: &[Candidate],
     smoother: &mut DepthSmoother,
 ) -> Option<(Efficient, Option<Alternative>)> {
-    let mut starts = near_best(candidates, inliers.n).iter().take(TRIED);
+    let mut starts = near_best(candidates, inliers.n).iter().take(FINALISTS);
     if let Some(depths) = &options.weight_depths {
         let mut nu: Vec<f64> = inliers.source.iter().map(|&k| depths[k as usize]).collect();
         nu.resize(inliers.stride, 0.0);

@@ -9,6 +9,8 @@
 //! the curvature of the profile that they show, and with what the other unknowns are known to there.
 
 use super::covariance::{damping, direction_block, direction_deviation, inverse};
+use super::refine::root;
+use super::starts::SEARCHED;
 use crate::motion3d::kernels::{Bilinear, information};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
@@ -38,10 +40,6 @@ const FARTHEST: f64 = 1.5;
 /// The direction's standard deviation as a share of the field beyond which no covariance describes the shape
 /// of the profile, whose every bend counts.
 const BEYOND: f64 = 1.5;
-
-/// Most steps towards the profile's minimum, and the length of one that is the last, rad.
-const STEPS: usize = 15;
-const STEP: f64 = 1e-9;
 
 /// Mean fourth power of a normal variable of variance 1.
 const KURTOSIS: f64 = 3.0;
@@ -222,7 +220,11 @@ impl ProfileLikelihood<'_> {
         let there = carried(axes, &start.u());
         let nu = weights(&start);
         let equation = Bilinear::new(self.observations, &start, &there, &nu, damped);
-        let rest = floor(&equation, axes, guess, &moved)?;
+        let of_others = |rest: &Vector4| {
+            let (value, slopes) = equation.at(&moved(rest), axes);
+            (value.fixed_rows::<4>(1).into_owned(), slopes.fixed_view::<4, 4>(1, 1).into_owned())
+        };
+        let rest = root(guess, of_others, |rest, step| rest + step)?;
         let motion = moved(&rest).normalized();
         let squares = information(self.observations, &motion, &there, &nu, damped);
         let (value, _) = equation.at(&motion, &there);
@@ -236,35 +238,9 @@ fn others(information: &Matrix5) -> Option<Matrix4<f64>> {
     information.fixed_view::<4, 4>(1, 1).into_owned().cholesky().map(|factor| factor.inverse())
 }
 
-/// The other unknowns that solve their equations.
-fn floor(
-    equation: &Bilinear,
-    axes: &Matrix2x3<f64>,
-    guess: Vector4,
-    moved: &impl Fn(&Vector4) -> Motion,
-) -> Option<Vector4> {
-    let mut rest = guess;
-    for _ in 0..STEPS {
-        let (value, slope) = equation.at(&moved(&rest), axes);
-        let slope = slope.fixed_view::<4, 4>(1, 1).into_owned();
-        let change = slope.lu().solve(&-value.fixed_rows::<4>(1).into_owned())?;
-        if !change.iter().all(|value| value.is_finite()) {
-            return None;
-        }
-        rest += change;
-        if change.norm() < STEP {
-            return Some(rest);
-        }
-    }
-    None
-}
-
-/// Points from which the spread of all is computed.
-const MAX_SPREAD_POINTS: usize = 1000;
-
 /// Root mean square distance of points from their middle.
 fn spread(points: &[[f64; 3]]) -> f64 {
-    let few = || points.iter().step_by(points.len().div_ceil(MAX_SPREAD_POINTS).max(1)).map(|at| Vector3::from(*at));
+    let few = || points.iter().step_by(points.len().div_ceil(SEARCHED).max(1)).map(|at| Vector3::from(*at));
     let n = few().count().max(1) as f64;
     let middle: Vector3<f64> = few().sum::<Vector3<f64>>() / n;
     (few().map(|at| (at - middle).norm_squared()).sum::<f64>() / n).sqrt()

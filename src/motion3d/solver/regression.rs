@@ -1,6 +1,7 @@
 //! Depths predicted from neighbours: leave-one-out local-linear regression, a point in every lane.
 
 use crate::math::kd_tree::Neighbours;
+use crate::motion3d::model::observations::ALIGN;
 use crate::motion3d::model::rows::tangents;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use nalgebra::{Matrix2x3, Vector3};
@@ -8,9 +9,6 @@ use rayon::prelude::*;
 
 /// Points of one task; a multiple of every lane count.
 const BAND: usize = 256;
-
-/// Most lanes.
-const MAX_LANES: usize = 16;
 
 /// Weight that the farthest neighbour keeps.
 const TAIL: f64 = 0.001;
@@ -49,53 +47,29 @@ struct Regress<'a> {
     c: &'a mut [f64],
 }
 
-/// The neighbours number `j` of a group of points, seen from each of them in units of its reach.
-struct Group {
-    x: [f64; MAX_LANES],
-    y: [f64; MAX_LANES],
-    /// Square distance.
-    d2: [f64; MAX_LANES],
-    nu: [f64; MAX_LANES],
-    s2: [f64; MAX_LANES],
-}
-
-impl Group {
-    #[inline(always)]
-    fn put(&mut self, lane: usize, from: &Site, site: &Site, axes: Option<&Matrix2x3<f64>>, scale: f64) {
-        let d =
-            [(site.at[0] - from.at[0]) * scale, (site.at[1] - from.at[1]) * scale, (site.at[2] - from.at[2]) * scale];
-        self.d2[lane] = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        let [x, y] = match axes {
-            None => [d[0], d[1]],
-            Some(e) => [
-                e[(0, 0)] * d[0] + e[(0, 1)] * d[1] + e[(0, 2)] * d[2],
-                e[(1, 0)] * d[0] + e[(1, 1)] * d[1] + e[(1, 2)] * d[2],
-            ],
-        };
-        self.x[lane] = x;
-        self.y[lane] = y;
-        self.nu[lane] = site.nu;
-        self.s2[lane] = site.s2;
-    }
+/// A neighbour as a point sees it, in units of its reach: place, squared distance, depth and its precision.
+#[inline(always)]
+fn seen_from(from: &Site, site: &Site, axes: Option<&Matrix2x3<f64>>, scale: f64) -> [f64; 5] {
+    let d = [0, 1, 2].map(|i| (site.at[i] - from.at[i]) * scale);
+    let [x, y] = match axes {
+        None => [d[0], d[1]],
+        Some(e) => [0, 1].map(|i| e[(i, 0)] * d[0] + e[(i, 1)] * d[1] + e[(i, 2)] * d[2]),
+    };
+    [x, y, d[0] * d[0] + d[1] * d[1] + d[2] * d[2], site.nu, site.s2]
 }
 
 impl Kernel<f64> for Regress<'_> {
     type Output = ();
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) {
-        let mut group = Group {
-            x: [0.0; MAX_LANES],
-            y: [0.0; MAX_LANES],
-            d2: [0.0; MAX_LANES],
-            nu: [0.0; MAX_LANES],
-            s2: [0.0; MAX_LANES],
-        };
+        // Neighbours of the same number of a point in every lane.
+        let mut group = [[0.0; ALIGN]; 5];
         let (one, tail) = (V::constant(1.0), V::constant(TAIL));
         for start in (0..self.queries.len()).step_by(V::LANES) {
             let lanes = V::LANES.min(self.queries.len() - start);
-            let mut from = [Site::default(); MAX_LANES];
-            let mut axes = [None; MAX_LANES];
-            let mut scale = [0.0; MAX_LANES];
+            let mut from = [Site::default(); ALIGN];
+            let mut axes = [None; ALIGN];
+            let mut scale = [0.0; ALIGN];
             for lane in 0..lanes {
                 from[lane] = self.sites[self.queries[start + lane] as usize];
                 if self.spherical {
@@ -113,17 +87,21 @@ impl Kernel<f64> for Regress<'_> {
             for j in 0..self.k {
                 for lane in 0..lanes {
                     let place = self.neighbours.of(self.first + start + lane)[j];
-                    group.put(lane, &from[lane], &self.sites[place as usize], axes[lane].as_ref(), scale[lane]);
+                    let site = &self.sites[place as usize];
+                    let seen = seen_from(&from[lane], site, axes[lane].as_ref(), scale[lane]);
+                    for (values, value) in group.iter_mut().zip(seen) {
+                        values[lane] = value;
+                    }
                 }
-                let (x, y) = (V::load(&group.x), V::load(&group.y));
+                let (x, y) = (V::load(&group[0]), V::load(&group[1]));
                 // The farthest is at 1 up to the rounding of distances.
-                let d2 = V::load(&group.d2).min(one);
+                let d2 = V::load(&group[2]).min(one);
                 let near = one - d2 * d2.sqrt();
                 let kappa = near.mul_add(near, tail);
-                let omega = kappa * V::load(&group.s2);
+                let omega = kappa * V::load(&group[4]);
                 let noise = kappa * omega;
                 let products = [one, x, y, x * x, x * y, y * y];
-                let nu = V::load(&group.nu) * omega;
+                let nu = V::load(&group[3]) * omega;
                 for i in 0..6 {
                     n[i] = omega.mul_add(products[i], n[i]);
                     v[i] = noise.mul_add(products[i], v[i]);
@@ -145,7 +123,7 @@ impl Kernel<f64> for Regress<'_> {
             let mixed = first.mul_add(second * v[1], first.mul_add(third * v[2], second * third * v[4]));
             let pure = first.mul_add(first * v[0], second.mul_add(second * v[3], third * third * v[5]));
             let c = (mixed + mixed + pure) * inverse * inverse;
-            let (mut at_q, mut at_c) = ([0.0; MAX_LANES], [0.0; MAX_LANES]);
+            let (mut at_q, mut at_c) = ([0.0; ALIGN], [0.0; ALIGN]);
             V::select(known, q, V::zero()).store(&mut at_q);
             V::select(known, c, V::constant(NO_PREDICTION)).store(&mut at_c);
             self.q[start..start + lanes].copy_from_slice(&at_q[..lanes]);

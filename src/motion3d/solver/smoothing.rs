@@ -1,6 +1,7 @@
 //! Which depths weigh the equations: predicted by what suits the scene best, then drawn to the prediction as
 //! far as that can be trusted.
 
+use super::refine::MANY;
 use super::regression::{Prediction, Site, regress};
 use super::starts::sample;
 use crate::math::kd_tree::{Neighbours, SIZES, Tree};
@@ -10,25 +11,16 @@ use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::Smoother;
 use crate::simd::Level;
 
-/// Most points that predictors are compared on.
-const COMPARED: usize = 4000;
-
 /// Most that a point counts, in squared standard deviations: a step in depth must not decide alone.
 const CAP: f64 = 25.0;
 
 /// Rounds of the excess variance of one prior.
 const PRIOR_ROUNDS: usize = 50;
 
-/// What predicts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Prior,
-    Nearest(usize),
-}
-
 /// A fitted predictor with what it says about the compared points.
 struct Fitted {
-    kind: Kind,
+    /// Number of neighbours; `None`: one prior.
+    nearest: Option<usize>,
     prediction: Prediction,
     excess: f64,
     /// Mean of `ln tot + min(res^2 / tot, 25)`.
@@ -63,7 +55,7 @@ impl DepthSmoother {
     pub fn new(observations: &Observations, which: Smoother, rng: CounterRng) -> Self {
         let tree = Tree::new(&observations.site);
         let n = observations.n;
-        let compared = sample(n, COMPARED, rng);
+        let compared = sample(n, MANY, rng);
         let most = SIZES.into_iter().rfind(|&k| k < n);
         let lists = most.map_or_else(Neighbours::default, |k| tree.nearest(&compared, k));
         Self {
@@ -92,7 +84,7 @@ impl DepthSmoother {
             let prediction = regress(sites, &self.compared, &self.lists, k, self.spherical, self.level);
             let excess = excess_variance(&compared, &prediction);
             let loss = loss(&compared, &prediction, excess, 0.0);
-            Fitted { kind: Kind::Nearest(k), prediction, excess, loss }
+            Fitted { nearest: Some(k), prediction, excess, loss }
         });
         let better = |best: Fitted, other: Fitted| if other.loss < best.loss { other } else { best };
         let best = prior.into_iter().chain(regressions).reduce(better);
@@ -125,7 +117,7 @@ impl DepthSmoother {
         }
         let prediction = Prediction { q: vec![mean; compared.len()], c: vec![0.0; compared.len()] };
         let loss = loss(compared, &prediction, excess, 0.0);
-        Fitted { kind: Kind::Prior, prediction, excess, loss }
+        Fitted { nearest: None, prediction, excess, loss }
     }
 
     /// How unlikely the depths are, given their neighbours, in units of `J`: `sum [ln(tot s^2) + min(res^2 /
@@ -139,14 +131,14 @@ impl DepthSmoother {
     /// The posterior means `nu~ = q + (t2 + c) / tot (nu^ - q)` of all depths; as long as the planes.
     pub fn smooth(&mut self, depths: &Depths) -> Smoothed {
         let sites = self.depth_sites(depths);
-        let (Fitted { kind, prediction, excess, .. }, _) = self.best(&sites, self.which);
-        let all = match kind {
-            Kind::Prior => {
+        let (Fitted { nearest, prediction, excess, .. }, _) = self.best(&sites, self.which);
+        let all = match nearest {
+            None => {
                 let mean = prediction.q.first().copied().unwrap_or(0.0);
                 Prediction { q: vec![mean; sites.len()], c: vec![0.0; sites.len()] }
             }
-            Kind::Nearest(_) if self.compared.len() == sites.len() => prediction,
-            Kind::Nearest(k) => {
+            Some(_) if self.compared.len() == sites.len() => prediction,
+            Some(k) => {
                 let everyone: Vec<u32> = (0..sites.len() as u32).collect();
                 if self.everyone.as_ref().is_none_or(|lists| lists.k < k) {
                     self.everyone = Some(self.tree.nearest(&everyone, k));
