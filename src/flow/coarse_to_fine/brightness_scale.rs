@@ -48,10 +48,15 @@ impl BrightnessScale {
     /// From the finite, unmasked samples: their middle nine tenths, since a single no-data value may be 1e9,
     /// but at least a share of the trimmed extent, since pictures may be dark but for a few spots.
     pub fn of<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&Mask>) -> Self {
+        Self::of_samples(frames, mask, MAX_SAMPLES)
+    }
+
+    /// The same from about so many samples at most.
+    pub fn of_samples<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&Mask>, max_samples: usize) -> Self {
         let allowed = |at: usize| mask.is_none_or(|mask| mask.data().get(at).copied().unwrap_or(true));
         let mut values: Vec<f64> = Vec::new();
         for frame in frames {
-            let stride = (frames.len() * frame.data().len() / MAX_SAMPLES).max(1);
+            let stride = (frames.len() * frame.data().len() / max_samples).max(1);
             let places = (0..frame.data().len()).step_by(stride).filter(|&at| allowed(at));
             values.extend(places.map(|at| frame.data()[at].to_f64()).filter(|value| value.is_finite()));
         }

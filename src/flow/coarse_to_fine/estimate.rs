@@ -18,6 +18,8 @@ pub(super) struct Estimate<T> {
     /// Summary of the last data term.
     pub data: Planes<T>,
     pub brightness: BrightnessScale,
+    /// Factor of the variance of the noise where frames were equalised.
+    pub noise_gain: f64,
     /// Statistics by which windows were chosen; `None` without sites.
     pub statistics: Option<WindowStatistics<T>>,
     /// The same for the difference of a triple's next step from its mean step.

@@ -1,6 +1,7 @@
 //! Entry point: runs the stages from frames to a filled field.
 
 use super::acceleration::to_middle_frame;
+use super::brightness_change::{equalize_along, equalize_roughly};
 use super::brightness_scale::BrightnessScale;
 use super::covariance::CovarianceMaps;
 use super::descent::{DescentPlan, DescentResult};
@@ -13,9 +14,12 @@ use super::refine::{RefineOptions, WindowStatistics, refine};
 use super::schedule::Schedule;
 use super::workspace::{Workspace, WorkspaceStore};
 use crate::error::Result;
-use crate::flow::options::{EstimatorOptions, InitialFlow};
+use crate::flow::options::EstimatorOptions;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame};
+
+/// Maximum number of measurements of a change of brightness: the first rest on a motion between unequal frames.
+const MAX_MEASUREMENTS: usize = 4;
 
 #[derive(Debug)]
 pub(in crate::flow) struct CoarseToFine {
@@ -46,20 +50,56 @@ impl CoarseToFine {
         field: &mut FlowField<T>,
     ) {
         common.threads.install(|| {
-            let simd = common.level();
-            let brightness = BrightnessScale::of(frames, common.mask.as_ref());
             let mut workspace = self.store.take::<T>();
-            let schedule = Schedule::new(self.options.preset, frames.len());
-            let levels = (self.options.levels, schedule.finest_level);
-            let finest = workspace.pyramid.fill(simd, frames, brightness, common.mask.as_ref(), levels);
-            let plan = DescentPlan { simd, schedule, brightness, finest, keeps_levels: field.covariance.is_some() };
-            let initial = common.initial.as_deref();
-            let mut estimate = estimate(&plan, (frames.len() == 3, self.options.central), initial, &mut workspace);
+            let (plan, coarse, noise_gain) =
+                self.coarse_levels(&mut workspace, frames, common, field.covariance.is_some());
+            let (coarse, iterations) = match common.initial.as_deref() {
+                Some(given) => plan.with_given(&mut workspace, given, frames.len() == 2, coarse),
+                None => (coarse, 0),
+            };
+            let found = plan.estimate_fine_levels(&mut workspace, coarse, iterations);
+            let mut estimate = estimate(&plan, found, (frames.len() == 3, self.options.central), &mut workspace);
+            estimate.noise_gain = noise_gain;
             let covariance_of = covariance_of(&mut estimate, &mut workspace, (frames, common), field);
             output::fill((&estimate, covariance_of), &workspace.space, frames, common, field);
             estimate.recycle(&workspace);
             self.store.put_back(workspace);
         });
+    }
+
+    /// The motion on a coarse level, between frames without changes of brightness; with the factor of the
+    /// variance of the noise that their removal brings.
+    fn coarse_levels<T: SimdReal>(
+        &self,
+        workspace: &mut Workspace<T>,
+        frames: &[&Frame<T>],
+        common: &EstimatorOptions,
+        keeps_levels: bool,
+    ) -> (DescentPlan, DescentResult<T>, f64) {
+        let (simd, mask) = (common.level(), common.mask.as_ref());
+        let schedule = Schedule::new(self.options.preset, frames.len());
+        let levels = (self.options.levels, schedule.finest_level);
+        let mut equalized = equalize_roughly(frames, mask);
+        let mut measurements = 0;
+        loop {
+            let equal: Vec<&Frame<T>> = equalized.iter().flat_map(|equalized| &equalized.frames).collect();
+            let compared = if equal.is_empty() { frames } else { &equal };
+            let brightness = BrightnessScale::of(compared, mask);
+            let finest = workspace.pyramid.fill(simd, compared, brightness, mask, levels);
+            let plan = DescentPlan { simd, schedule, brightness, finest, keeps_levels };
+            let level = plan.coarse_level(workspace);
+            let coarse = plan.estimate_coarse_levels(workspace);
+            let views = workspace.pyramid.levels()[level].views(ComparedFrames::All);
+            let pixel = f64::from(1u32 << level);
+            let again = equalize_along(simd, compared, (&views, brightness), &coarse.motion, pixel);
+            measurements += 1;
+            let noise_gain = equalized.as_ref().map_or(1.0, |equalized| equalized.noise_gain);
+            let Some(again) = again.filter(|_| measurements < MAX_MEASUREMENTS) else {
+                return (plan, coarse, noise_gain);
+            };
+            coarse.recycle(&workspace.space);
+            equalized = Some(again.after(noise_gain));
+        }
     }
 }
 
@@ -88,15 +128,11 @@ fn covariance_of<T: SimdReal>(
 
 fn estimate<T: SimdReal>(
     plan: &DescentPlan,
+    mut found: DescentResult<T>,
     (is_triple, central): (bool, bool),
-    initial: Option<&InitialFlow>,
     workspace: &mut Workspace<T>,
 ) -> Estimate<T> {
     let simd = plan.simd;
-    let mut found = match initial {
-        Some(given) => plan.estimate_from(workspace, given, !is_triple),
-        None => plan.estimate_all_levels(workspace),
-    };
     let (mut motion, mut statistics) =
         refine(simd, &workspace.space, &RefineOptions::default(), &found.motion, &found.data);
     if is_triple {
@@ -134,6 +170,7 @@ fn estimate<T: SimdReal>(
         motion,
         data,
         brightness: plan.brightness,
+        noise_gain: 1.0,
         statistics,
         acceleration,
         locking,

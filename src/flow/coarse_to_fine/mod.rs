@@ -3,6 +3,8 @@
 //! Data pass the stages in this order:
 //!
 //! 1. [`brightness_scale`], [`pyramid`]: frames are scaled to a common contrast and halved repeatedly.
+//!    Above the finest levels, [`brightness_change`] compares the frames along the motion; where gain or offset
+//!    differ, frames are equalised and the pyramid is filled again.
 //! 2. [`descent`]: from the coarsest level down, each level repeats two steps: [`data_term`] warps the frames
 //!    by the present motion and sums windowed normal equations (rows 1 to 3 of WO2010/098160, (21)) at every
 //!    second pixel; [`regularize`] minimises data and robust smoothness terms together. [`resample`] carries
@@ -15,7 +17,7 @@
 //! 7. [`output`]: the field at the requested sites, with status and diagnostics.
 //!
 //! [`estimator`] runs the stages, [`schedule`] says how much work each level gets, [`estimate`] is what the
-//! stages leave for covariance and output. [`planes`], [`plane_pool`] and [`workspace`] hold the memory.
+//! stages leave for covariance and output. [`planes`], [`extended`], [`plane_pool`] and [`workspace`] hold the memory.
 //!
 //! Flow of a pair belongs to the pixels of the first frame. Every usable pixel gets an estimate; untextured
 //! areas and pixels that leave the frame are filled from their surroundings. Fine random texture that moves
@@ -24,12 +26,14 @@
 //! `docs/design/coarse_to_fine.md` the origin of the constants.
 
 mod acceleration;
+mod brightness_change;
 mod brightness_scale;
 mod covariance;
 mod data_term;
 mod descent;
 mod estimate;
 mod estimator;
+mod extended;
 mod options;
 mod output;
 mod peak_locking;

@@ -19,8 +19,12 @@ pub(super) struct Schedule {
     pub smoothness: Smoothness,
     /// Relaxation sweeps on the finest level: cheap, they remove most of what one linearisation leaves.
     pub finest_sweeps: usize,
+    /// Whether blocks are searched for on a coarse level (large motions).
+    pub searches: bool,
     /// Levels above the finest from which the unregularised trial is run (small objects); `None`: never.
     pub trial_from: Option<usize>,
+    /// Last iterations on the finest level before which the flow is sharpened at motion boundaries.
+    pub finest_sharpened: usize,
     /// Whether the motion one level above the finest is refined before it is carried down, for less noise.
     /// Not at half resolution, where that level has too few sites to choose windows.
     pub refines_intermediate: bool,
@@ -35,6 +39,11 @@ const COARSE_SWEEPS: usize = 10;
 /// Maximum break strain on such a level: neighbours are far apart, and under fast rotation move differently.
 const COARSE_BREAK_STRAIN: f64 = 0.07;
 
+/// Maximum size, pixels, of the level on which blocks are searched for.
+const MAX_SEARCHED_PIXELS: usize = 20_000;
+/// Levels, from the finest up, on which the flow is sharpened at motion boundaries: coarser ones have few sites.
+const SHARPENED_LEVELS: usize = 3;
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LevelSchedule {
     pub max_iterations: usize,
@@ -42,7 +51,11 @@ pub(super) struct LevelSchedule {
     pub tolerance: f64,
     pub smoothness: Smoothness,
     pub runs_trial: bool,
+    /// Whether blocks are searched for.
+    pub searches: bool,
     pub refines: bool,
+    /// Iteration from which on the flow is sharpened at motion boundaries.
+    pub sharpens_from: usize,
 }
 
 impl Schedule {
@@ -58,7 +71,9 @@ impl Schedule {
                 tolerance: [0.02; 2],
                 smoothness: Smoothness { sweeps: 4, ..smoothness },
                 finest_sweeps: 4,
+                searches: false,
                 trial_from: None,
+                finest_sharpened: 0,
                 refines_intermediate: false,
             },
             Preset::Balanced => Self {
@@ -68,7 +83,9 @@ impl Schedule {
                 tolerance: [finest_tolerance, 0.023],
                 smoothness: Smoothness { sweeps: 4, break_strain: 0.14, ..smoothness },
                 finest_sweeps,
+                searches: true,
                 trial_from: Some(2),
+                finest_sharpened: 1,
                 refines_intermediate: true,
             },
             Preset::Accurate => Self {
@@ -78,7 +95,9 @@ impl Schedule {
                 tolerance: [0.003; 2],
                 smoothness: Smoothness { break_strain: 0.2, ..smoothness },
                 finest_sweeps: smoothness.sweeps,
+                searches: true,
                 trial_from: Some(2),
+                finest_sharpened: usize::MAX,
                 refines_intermediate: true,
             },
         }
@@ -107,6 +126,13 @@ impl Schedule {
         LevelSchedule { runs_trial, refines, ..self.up_to(k, max_iterations) }
     }
 
+    /// The level on which blocks are searched for: the finest that is small enough, but not the finest of all.
+    pub fn searched_level(&self, sizes: impl Iterator<Item = (usize, usize)>) -> Option<usize> {
+        let is_small = |(_, (width, height)): &(usize, (usize, usize))| width * height <= MAX_SEARCHED_PIXELS;
+        let (found, _) = sizes.enumerate().skip(self.finest_level + 1).find(is_small)?;
+        Some(found).filter(|_| self.searches)
+    }
+
     /// Level `k` with at most `max_iterations` iterations, without trial and refinement.
     pub fn up_to(&self, k: usize, max_iterations: usize) -> LevelSchedule {
         let [finest, others] = self.tolerance;
@@ -117,7 +143,13 @@ impl Schedule {
             tolerance,
             smoothness: Smoothness { sweeps, ..self.smoothness },
             runs_trial: false,
+            searches: false,
             refines: false,
+            sharpens_from: match k {
+                _ if k <= self.finest_level => max_iterations.saturating_sub(self.finest_sharpened),
+                _ if k < self.finest_level + SHARPENED_LEVELS => 1,
+                _ => usize::MAX,
+            },
         }
     }
 }

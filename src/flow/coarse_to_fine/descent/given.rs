@@ -12,50 +12,39 @@ use crate::image::{Interpolation, fill_holes};
 use crate::simd::SimdReal;
 use crate::types::Frame;
 
-/// Levels above the finest on which the given flow competes: its errors are smaller than structure there.
-const LEVELS_ABOVE: usize = 2;
 /// Steps of the iteration that carries a pair's flow to the time midway between its frames.
 const MIDWAY_STEPS: usize = 3;
 
 impl DescentPlan {
-    /// As [`estimate_all_levels`](Self::estimate_all_levels), with the `given` flow where the frames agree
-    /// better with it. `midway`: motion is estimated midway between two frames, the flow given at the first.
-    pub fn estimate_from<T: SimdReal>(
+    /// The `own` result on the coarse level, with the `given` flow where the frames agree better with it; and the
+    /// number of iterations that both need together. `midway`: motion is estimated midway between two frames,
+    /// the flow given at the first.
+    pub fn with_given<T: SimdReal>(
         &self,
         workspace: &mut Workspace<T>,
         given: &InitialFlow,
         midway: bool,
-    ) -> DescentResult<T> {
+        mut own: DescentResult<T>,
+    ) -> (DescentResult<T>, usize) {
         let (all, levels) = (ComparedFrames::All, workspace.pyramid.levels());
-        let first = (levels.len() - 1).min(self.finest + LEVELS_ABOVE);
+        let first = self.coarse_level(workspace);
         let mut start = workspace.space.planes(0, 0, MOTION);
         sample(given, first, levels[first].size, midway, &mut start);
         let mut schedules = self.schedules(levels);
-        let rest = Self::at_rest(workspace);
-        let own = self.descend(workspace, all, rest, (&schedules, first));
         schedules.truncate(first + 1);
-        let refined = self.without_levels().descend(workspace, all, start, (&schedules, first));
+        let refined = self.without_levels().descend(workspace, all, (start, None), (&schedules, first));
         let Workspace { pyramid, pool, space, .. } = &*workspace;
         let level = &pyramid.levels()[first];
         let (simd, residual_std, follows_majority) = (self.simd, own.residual_std, true);
         let comparison = Comparison { simd, level, compared: all, residual_std, follows_majority, pool, space };
-        let mut motion = own.motion;
-        let is_used = comparison.replace_where_better(&mut motion, &refined.motion, MIN_MOTION_DIFFERENCE);
-        let mut coarser = own.coarser_motions;
+        let is_used = comparison.replace_where_better(&mut own.motion, &refined.motion, MIN_MOTION_DIFFERENCE);
         if is_used {
-            for (k, planes) in (first + 1..).zip(&mut coarser) {
-                space.keep(std::mem::replace(planes, coarsened(workspace, &motion, first..=k)));
+            for (k, planes) in (first + 1..).zip(&mut own.coarser_motions) {
+                space.keep(std::mem::replace(planes, coarsened(workspace, &own.motion, first..=k)));
             }
         }
-        for planes in [own.data, refined.motion, refined.data] {
-            space.keep(planes);
-        }
-        let joint = &mut schedules[first];
-        (joint.runs_trial, joint.refines) = (false, false);
-        joint.max_iterations = if is_used || first == self.finest { JOINT_ITERATIONS } else { 0 };
-        let mut found = self.descend(workspace, all, motion, (&schedules, self.finest));
-        found.coarser_motions.extend(coarser);
-        found
+        refined.recycle(space);
+        (own, if is_used { JOINT_ITERATIONS } else { 0 })
     }
 }
 

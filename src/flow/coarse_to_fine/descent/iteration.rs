@@ -1,6 +1,7 @@
 //! One iteration: a linearisation and the regularised solution that follows.
 
 use super::DescentPlan;
+use super::block_matches::block_matches;
 use super::comparison::Comparison;
 use crate::flow::coarse_to_fine::brightness_scale::MIN_RESIDUAL_SHARE;
 use crate::flow::coarse_to_fine::data_term::{DataTerm, MOTION, Pool};
@@ -32,8 +33,9 @@ const TRIAL: (usize, Smoothness) =
 pub(super) const MIN_MOTION_DIFFERENCE: f64 = 0.5;
 /// Minimum change in the first iteration of the trial, px of the level: else no site leaves its motion.
 const MIN_TRIAL_CHANGE: f64 = 0.25;
-/// Regularised iterations after both motions are combined.
+/// Regularised iterations after both motions are combined; after matches, which are whole px.
 pub(super) const JOINT_ITERATIONS: usize = 2;
+const MATCH_ITERATIONS: usize = 6;
 
 pub(super) struct Iteration<'a, T> {
     pub plan: &'a DescentPlan,
@@ -90,6 +92,31 @@ impl<T: SimdReal> Iteration<'_, T> {
             }
         }
         space.keep(trial);
+    }
+
+    /// Takes over matches of blocks where they are better.
+    pub fn try_block_matches(
+        &mut self,
+        level: &PyramidLevel<T>,
+        smoothness: &Smoothness,
+        (motion, old): (&mut Planes<T>, &mut Planes<T>),
+        (pool, space): (&Pool<T>, &PlanePool<T>),
+    ) {
+        let DescentPlan { simd, .. } = *self.plan;
+        let views = level.views(self.compared);
+        let matches = match block_matches(simd, &views, motion, copy(space, motion)) {
+            Ok(matches) => {
+                let (compared, residual_std) = (self.compared, self.residual_std);
+                let comparison =
+                    Comparison { simd, level, compared, residual_std, follows_majority: false, pool, space };
+                if comparison.replace_where_better(motion, &matches, MIN_MOTION_DIFFERENCE) {
+                    self.repeat(MATCH_ITERATIONS, level, smoothness, (motion, old));
+                }
+                matches
+            }
+            Err(unused) => unused,
+        };
+        space.keep(matches);
     }
 
     /// Linearises about `motion` and updates it. Returns the root-mean-square change of the flow, px.

@@ -1,16 +1,20 @@
 //! Descent through the pyramid: iterations on each level, from the coarsest to the finest.
 //!
-//! `iteration` is one linearisation with its regularised solution, and the unregularised trial; `comparison`
-//! takes the better of two motions at each site; `intermediate` refines a level before the next one; `given`
-//! lets a flow from elsewhere compete.
+//! `weighted_median` sharpens the flow at motion boundaries before an iteration; `iteration` is one linearisation
+//! with its regularised solution, and the unregularised trial; `block_matches` finds large motions;
+//! `comparison` takes the better of two motions at each site; `intermediate` refines a level before the next
+//! one; `given` lets a flow from elsewhere compete.
 
+mod block_matches;
 pub(super) mod comparison;
 mod given;
 mod intermediate;
 mod iteration;
+mod weighted_median;
 
 use super::brightness_scale::BrightnessScale;
 use super::data_term::{COUNT, DataOptions, DataTerm, MOTION, summary};
+use super::plane_pool::PlanePool;
 use super::planes::Planes;
 use super::pyramid::{ComparedFrames, PyramidLevel};
 use super::resample::{coarser, finer};
@@ -21,6 +25,10 @@ use comparison::Comparison;
 use intermediate::refine_intermediate;
 use iteration::{Iteration, copy, has_settled};
 use std::ops::RangeInclusive;
+use weighted_median::{Deviations, weighted_median};
+
+/// Levels from the coarse level down to the finest.
+const LEVELS_ABOVE: usize = 2;
 
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DescentPlan {
@@ -43,26 +51,66 @@ pub(super) struct DescentResult<T> {
     pub coarser_motions: Vec<Planes<T>>,
 }
 
+impl<T: SimdReal> DescentResult<T> {
+    /// Returns all planes.
+    pub fn recycle(self, space: &PlanePool<T>) {
+        self.coarser_motions.into_iter().chain([self.motion, self.data]).for_each(|planes| space.keep(planes));
+    }
+}
+
 impl DescentPlan {
-    /// Descends from the coarsest level of the filled pyramid, starting without motion.
-    pub fn estimate_all_levels<T: SimdReal>(&self, workspace: &mut Workspace<T>) -> DescentResult<T> {
-        let schedules = self.schedules(workspace.pyramid.levels());
-        let rest = Self::at_rest(workspace);
-        self.descend(workspace, ComparedFrames::All, rest, (&schedules, self.finest))
+    /// The level on which brightness is compared and a given flow competes: errors are smaller than structure.
+    pub fn coarse_level<T: SimdReal>(&self, workspace: &Workspace<T>) -> usize {
+        (self.finest + LEVELS_ABOVE).min(workspace.pyramid.levels().len() - 1)
+    }
+
+    /// Descends from the coarsest level of the filled pyramid, starting without motion, to the coarse level.
+    pub fn estimate_coarse_levels<T: SimdReal>(&self, workspace: &mut Workspace<T>) -> DescentResult<T> {
+        let levels = workspace.pyramid.levels();
+        let schedules = self.schedules(levels);
+        let (width, height) = levels.last().map_or((0, 0), |level| site_counts(level.size));
+        let mut rest = workspace.space.planes(width, height, MOTION);
+        rest.data_mut().fill(T::from_f64(0.0));
+        self.descend(workspace, ComparedFrames::All, (rest, None), (&schedules, self.coarse_level(workspace)))
+    }
+
+    /// Descends further from the result on the coarse level, after `iterations` there.
+    pub fn estimate_fine_levels<T: SimdReal>(
+        &self,
+        workspace: &mut Workspace<T>,
+        coarse: DescentResult<T>,
+        iterations: usize,
+    ) -> DescentResult<T> {
+        let from = self.coarse_level(workspace);
+        if from == self.finest && iterations == 0 {
+            return coarse;
+        }
+        let mut schedules = self.schedules(workspace.pyramid.levels());
+        schedules.truncate(from + 1);
+        schedules[from] = LevelSchedule {
+            max_iterations: iterations,
+            runs_trial: false,
+            searches: false,
+            refines: false,
+            ..schedules[from]
+        };
+        let DescentResult { motion, data, residual_std, coarser_motions } = coarse;
+        workspace.space.keep(data);
+        let mut fine = self.descend(workspace, ComparedFrames::All, (motion, residual_std), (&schedules, self.finest));
+        fine.coarser_motions.extend(coarser_motions);
+        fine
     }
 
     /// The schedule of every level.
     fn schedules<T>(&self, levels: &[PyramidLevel<T>]) -> Vec<LevelSchedule> {
         let count = levels.len();
-        levels.iter().enumerate().map(|(k, level)| self.schedule.on_level(k, level.size, k + 1 == count)).collect()
-    }
-
-    /// No motion, on the coarsest level.
-    fn at_rest<T: SimdReal>(workspace: &Workspace<T>) -> Planes<T> {
-        let (width, height) = workspace.pyramid.levels().last().map_or((0, 0), |level| site_counts(level.size));
-        let mut motion = workspace.space.planes(width, height, MOTION);
-        motion.data_mut().fill(T::from_f64(0.0));
-        motion
+        let sizes = levels.iter().map(|level| level.size);
+        let searched = self.schedule.searched_level(sizes.clone());
+        let schedule = |(k, size)| LevelSchedule {
+            searches: Some(k) == searched,
+            ..self.schedule.on_level(k, size, k + 1 == count)
+        };
+        sizes.enumerate().map(schedule).collect()
     }
 
     /// Repeats the finest level about a better `motion`.
@@ -71,7 +119,7 @@ impl DescentPlan {
         self.descend(
             workspace,
             ComparedFrames::All,
-            start,
+            (start, None),
             (&vec![self.schedule.up_to(self.finest, 1); self.finest + 1], self.finest),
         )
     }
@@ -87,7 +135,7 @@ impl DescentPlan {
         }
         let most = |k: usize| self.schedule.next_frame_iterations[k.saturating_sub(self.finest)];
         let schedules: Vec<_> = (0..=first).map(|k| self.schedule.up_to(k, most(k))).collect();
-        self.without_levels().descend(workspace, ComparedFrames::Ahead, start, (&schedules, self.finest))
+        self.without_levels().descend(workspace, ComparedFrames::Ahead, (start, None), (&schedules, self.finest))
     }
 
     fn without_levels(&self) -> Self {
@@ -102,7 +150,7 @@ impl DescentPlan {
         let schedules = self.schedules(levels);
         let start = coarsened(workspace, motion, level..=coarsest);
         let DescentResult { motion: coarser_motions, data, residual_std, .. } =
-            self.without_levels().descend(workspace, ComparedFrames::Ahead, start, (&schedules, level + 1));
+            self.without_levels().descend(workspace, ComparedFrames::Ahead, (start, None), (&schedules, level + 1));
         let Workspace { pyramid, pool, space, .. } = workspace;
         let level = &pyramid.levels()[level];
         let mut own = space.planes(0, 0, MOTION);
@@ -115,19 +163,20 @@ impl DescentPlan {
         }
     }
 
-    /// Descends from the coarsest level that has a schedule, on which `motion` is given, to the level `to`.
+    /// Descends from the coarsest level that has a schedule, on which the motion and the standard deviation of the
+    /// residual, if known, are given, to the level `to`.
     fn descend<T: SimdReal>(
         &self,
         workspace: &mut Workspace<T>,
         compared: ComparedFrames,
-        mut motion: Planes<T>,
+        (mut motion, residual_std): (Planes<T>, Option<T>),
         (schedules, to): (&[LevelSchedule], usize),
     ) -> DescentResult<T> {
         let Workspace { pyramid, pool, scratch, space } = workspace;
         let (width, height) = site_counts(pyramid.levels()[to].size);
         let mut data = space.planes(width, height, COUNT);
         let term = DataTerm::new(self.simd, DataOptions::default(), pool);
-        let mut step = Iteration { plan: self, compared, term, data: &mut data, scratch, residual_std: None };
+        let mut step = Iteration { plan: self, compared, term, data: &mut data, scratch, residual_std };
         let mut old = space.planes(0, 0, MOTION);
         let mut coarser_motions = Vec::new();
         for (k, (level, schedule)) in pyramid.levels().iter().zip(schedules).enumerate().skip(to).rev() {
@@ -135,13 +184,20 @@ impl DescentPlan {
                 std::mem::swap(&mut motion, &mut old);
                 finer(self.simd, &old, level.size, &mut motion);
             }
-            for _ in 0..schedule.max_iterations {
+            for n in 0..schedule.max_iterations {
+                if let Some(residual) = step.residual_std.filter(|_| n >= schedule.sharpens_from) {
+                    let deviations = Deviations { brightness: self.brightness.contrast, residual: residual.to_f64() };
+                    weighted_median(self.simd, space, &level.views(compared), deviations, &mut motion);
+                }
                 let change = step.advance(level, &schedule.smoothness, (&mut motion, &mut old));
                 // The finest level does not wait for objects: coarser levels have found them.
                 let is_calm = || k == self.finest || has_settled(&old, &motion);
                 if change <= schedule.tolerance && is_calm() {
                     break;
                 }
+            }
+            if schedule.searches {
+                step.try_block_matches(level, &schedule.smoothness, (&mut motion, &mut old), (pool, space));
             }
             if schedule.runs_trial {
                 step.try_unregularized(level, &schedule.smoothness, (&mut motion, &mut old), (pool, space));

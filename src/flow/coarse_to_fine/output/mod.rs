@@ -33,7 +33,9 @@ pub(super) fn covariance_of<T: SimdReal>(
     // White noise in each row: half its variance in a pair's difference, an eighth in a triple's.
     let share = if frames.len() == 2 { 0.5 } else { 0.125 };
     let halving_gain = halved_noise().powi(estimate.level as i32);
-    let energy_of = |variance: f64| share * rows() * halving_gain * variance * estimate.brightness.gain.powi(2);
+    let energy_of = |variance: f64| {
+        share * rows() * halving_gain * variance * estimate.noise_gain * estimate.brightness.gain.powi(2)
+    };
     let noise = match common.noise {
         Some(sigma) => Energy::Known(energy_of(sigma * sigma)),
         // Rounding is the minimum noise of integer samples.

@@ -14,6 +14,7 @@
 use super::data_term::{DataOptions, View};
 use super::planes::{LEFT, Planes};
 use super::pyramid::{ComparedFrames, PyramidLevel};
+use crate::math::{median, robust_std};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -24,6 +25,9 @@ const SAMPLES: usize = SIDE * SIDE;
 const PATCHES: f64 = 48.0;
 /// Minimum number of patches for a regression.
 const MIN_PATCHES: usize = 4;
+/// Scatter of a patch, standard deviations, at which its weight is a half; and repetitions with such weights.
+const HALF_WEIGHT_SCATTER: f64 = 2.5;
+const ROBUST_ROUNDS: usize = 5;
 /// Maximum amplitude of peak locking, px.
 const MAX_AMPLITUDE: f64 = 0.1;
 
@@ -68,7 +72,7 @@ impl PeakLocking {
         let mut found = Self { cycles, ..Self::default() };
         if sums.len() >= MIN_PATCHES {
             for c in 0..2 {
-                (found.amplitude[c], found.variance[c]) = regress(sums.iter().map(|s| &s[c]));
+                (found.amplitude[c], found.variance[c]) = regress(&sums.iter().map(|s| s[c]).collect::<Vec<_>>());
             }
         }
         found
@@ -92,13 +96,27 @@ impl PeakLocking {
 }
 
 /// Amplitude and its variance, from the scatter of the patches' sums; the amplitude is shrunk by its scatter.
-fn regress<'a>(sums: impl Iterator<Item = &'a Sums> + Clone) -> (f64, f64) {
-    let (product, weight) = sums.clone().fold((0.0, 0.0), |(p, w), s| (p + s.product, w + s.weight));
-    if weight <= 0.0 {
+/// Patches that scatter more than the others (dead or saturated pixels, occlusions) have little weight.
+fn regress(sums: &[Sums]) -> (f64, f64) {
+    let known: Vec<&Sums> = sums.iter().filter(|s| s.weight > 0.0).collect();
+    let Some(mut amplitude) = median(&mut known.iter().map(|s| s.product / s.weight).collect::<Vec<_>>()) else {
         return (0.0, 0.0);
+    };
+    let mut variance = 0.0;
+    for _ in 0..ROBUST_ROUNDS {
+        let scatter = |s: &Sums| (s.product - amplitude * s.weight) / s.weight.sqrt();
+        let Some(scale) = robust_std(&mut known.iter().map(|s| scatter(s).abs()).collect::<Vec<_>>()) else {
+            return (0.0, 0.0);
+        };
+        let inverse = 1.0 / (HALF_WEIGHT_SCATTER * scale).max(f64::MIN_POSITIVE);
+        let robust: Vec<f64> = known.iter().map(|s| 1.0 / (1.0 + (scatter(s) * inverse).powi(2))).collect();
+        let weighted = || known.iter().zip(&robust);
+        let (product, weight) =
+            weighted().fold((0.0, 0.0), |(p, w), (s, share)| (p + share * s.product, w + share * s.weight));
+        amplitude = product / weight;
+        variance = weighted().map(|(s, share)| (share * (s.product - amplitude * s.weight)).powi(2)).sum::<f64>()
+            / (weight * weight);
     }
-    let amplitude = product / weight;
-    let variance = sums.map(|s| (s.product - amplitude * s.weight).powi(2)).sum::<f64>() / (weight * weight);
     let kept = (1.0 - variance / (amplitude * amplitude).max(f64::MIN_POSITIVE)).max(0.0);
     ((kept * amplitude).clamp(-MAX_AMPLITUDE, MAX_AMPLITUDE), variance)
 }

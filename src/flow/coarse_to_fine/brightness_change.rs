@@ -1,0 +1,274 @@
+//! Change of brightness between the frames: gain and offset, smooth over the picture, measured and removed.
+//!
+//! Along the motion, the brightness of frame `f` is `g(x) I(x) + o(x)`, with `I` that of the reference frame.
+//! Both are read from means and standard deviations in wide windows, which a wrong motion changes little (a
+//! regression would find too small a gain); pixels that do not follow, occluded ones say, have little weight.
+//! Frames are equalised only if that explains much of their difference, so that equal ones stay what they are.
+//!
+//! Before any motion is known, whole frames are compared ([`equalize_roughly`]): enough for the coarse levels,
+//! on whose motion the change is then measured.
+
+use super::brightness_scale::BrightnessScale;
+use super::data_term::View;
+use super::planes::{Planes, SITE_SPACING};
+use crate::math::robust_std;
+use crate::simd::{Level, SimdReal};
+use crate::types::{Frame, Mask};
+use rayon::prelude::*;
+
+/// Differences of whole frames that motion alone hardly makes: logarithm of the ratio of their standard deviations,
+/// and difference of their means over the standard deviation.
+const ROUGH_CHANGE: [f64; 2] = [0.1, 0.2];
+/// Approximate number of pixels of a frame that this is judged by.
+const ROUGH_SAMPLES: usize = 1000;
+/// Maximum standard deviation of the residual that remains, over that before, for a change to be removed.
+const MAX_REMAINING: f64 = 0.8;
+/// Windows along the longer side.
+const WINDOWS: f64 = 8.0;
+/// Weight of the whole picture in each window, over that of the window: windows may have no texture.
+const WHOLE_SHARE: f64 = 0.1;
+/// Repetitions of the fit with robust weights.
+const ROUNDS: usize = 4;
+/// Residual, standard deviations, at which a pixel's weight is a half.
+const HALF_WEIGHT_RESIDUAL: f64 = 2.0;
+/// Bounds of the gain.
+const GAIN_BOUNDS: [f64; 2] = [0.1, 10.0];
+/// Minimum number of pixels, of a frame or of a measurement.
+const MIN_PIXELS: usize = 256;
+
+/// Index of the frame that the others are brought to: the one the field belongs to.
+fn reference(frames: usize) -> usize {
+    frames - 2
+}
+
+/// Frames with the mean and standard deviation of the reference frame; `None` if they have nearly.
+pub(super) fn equalize_roughly<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&Mask>) -> Option<Equalized<T>> {
+    let scales: Vec<_> =
+        frames.iter().map(|frame| BrightnessScale::of_samples(&[*frame], mask, ROUGH_SAMPLES)).collect();
+    let known = scales[reference(frames.len())];
+    let std = |scale: &BrightnessScale| scale.contrast / scale.gain;
+    if frames[0].data().len() < MIN_PIXELS || scales.iter().any(|scale| scale.contrast <= 0.0) {
+        return None;
+    }
+    let differs = |scale: &BrightnessScale| {
+        (std(scale) / std(&known)).ln().abs() > ROUGH_CHANGE[0]
+            || (scale.mean - known.mean).abs() > ROUGH_CHANGE[1] * std(&known)
+    };
+    scales.iter().any(differs).then(|| {
+        let of = |scale: &BrightnessScale| {
+            let gain = (std(scale) / std(&known)).clamp(GAIN_BOUNDS[0], GAIN_BOUNDS[1]);
+            LightMap::constant([gain, scale.mean - gain * known.mean])
+        };
+        equalize(frames, &scales.iter().map(of).collect::<Vec<_>>())
+    })
+}
+
+/// Frames without the change of brightness.
+pub(super) struct Equalized<T> {
+    pub frames: Vec<Frame<T>>,
+    /// Mean square of the factors that the noise of the compared frames was multiplied by.
+    pub noise_gain: f64,
+}
+
+impl<T> Equalized<T> {
+    /// Of frames that were equalised before.
+    pub fn after(self, noise_gain: f64) -> Self {
+        Self { noise_gain: noise_gain * self.noise_gain, ..self }
+    }
+}
+
+fn equalize<T: SimdReal>(frames: &[&Frame<T>], maps: &[LightMap]) -> Equalized<T> {
+    let mean = |map: &LightMap| map.nodes.iter().map(|[gain, _]| gain.powi(-2)).sum::<f64>() / map.nodes.len() as f64;
+    let compared: Vec<f64> =
+        maps.iter().enumerate().filter(|(n, _)| frames.len() == 2 || *n != 1).map(|(_, m)| mean(m)).collect();
+    let noise_gain = compared.iter().sum::<f64>() / compared.len() as f64;
+    Equalized { frames: frames.iter().zip(maps).map(|(frame, map)| map.remove_from(frame)).collect(), noise_gain }
+}
+
+/// Gain and offset on a grid over the frame, bilinear between the nodes.
+struct LightMap {
+    columns: usize,
+    rows: usize,
+    /// Nodes per px of the frame.
+    scale: [f64; 2],
+    nodes: Vec<[f64; 2]>,
+}
+
+impl LightMap {
+    fn constant(node: [f64; 2]) -> Self {
+        Self { columns: 1, rows: 1, scale: [0.0; 2], nodes: vec![node] }
+    }
+
+    fn remove_from<T: SimdReal>(&self, frame: &Frame<T>) -> Frame<T> {
+        let mut out = frame.clone();
+        let width = frame.width().max(1);
+        let along: Vec<(usize, f64)> = (0..width).map(|x| split(x as f64 * self.scale[0], self.columns)).collect();
+        out.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+            let (first, share) = split(y as f64 * self.scale[1], self.rows);
+            let line: Vec<[f64; 2]> = (0..self.columns)
+                .map(|x| {
+                    let [a, b] = [first, (first + 1).min(self.rows - 1)].map(|y| self.nodes[y * self.columns + x]);
+                    [0, 1].map(|k| a[k] + share * (b[k] - a[k]))
+                })
+                .collect();
+            for (value, &(at, share)) in row.iter_mut().zip(&along) {
+                let (a, b) = (line[at], line[(at + 1).min(self.columns - 1)]);
+                let [gain, offset] = [0, 1].map(|k| a[k] + share * (b[k] - a[k]));
+                *value = T::from_f64((value.to_f64() - offset) / gain);
+            }
+        });
+        out
+    }
+}
+
+/// Node before a position, and the share of the next.
+fn split(at: f64, count: usize) -> (usize, f64) {
+    let first = (at as usize).min(count.saturating_sub(2));
+    (first, (at - first as f64).clamp(0.0, 1.0))
+}
+
+/// Removes the change along the `motion` of a level of `size` pixels from the frames; `None` if there is none.
+/// `scale`: px of the frame per px of the level.
+pub(super) fn equalize_along<T: SimdReal>(
+    simd: Level,
+    frames: &[&Frame<T>],
+    (views, brightness): (&[View<'_, T>], BrightnessScale),
+    motion: &Planes<T>,
+    scale: f64,
+) -> Option<Equalized<T>> {
+    let samples: Vec<Vec<f64>> = views.iter().map(|view| sample(simd, view, motion)).collect();
+    let known = &samples[reference(frames.len())];
+    let size = (motion.width, motion.height);
+    let mut changes = false;
+    let maps: Vec<LightMap> = samples
+        .iter()
+        .map(|other| {
+            let found = Fit::new(size, known, other)?.map(scale, brightness);
+            changes = true;
+            Some(found)
+        })
+        .map(|map| map.unwrap_or_else(|| LightMap::constant([1.0, 0.0])))
+        .collect();
+    changes.then(|| equalize(frames, &maps))
+}
+
+/// Brightness of a view at the sites, along the motion; NaN beyond the frame.
+fn sample<T: SimdReal>(simd: Level, view: &View<'_, T>, motion: &Planes<T>) -> Vec<f64> {
+    let (width, height) = view.spline.size();
+    let row = |y: usize| {
+        let place = |site: usize, flow: &T| T::from_f64(SITE_SPACING * site as f64) + view.time * *flow;
+        let xs: Vec<T> = motion.line(0, y).iter().enumerate().map(|(x, u)| place(x, u)).collect();
+        let ys: Vec<T> = motion.line(1, y).iter().map(|v| place(y, v)).collect();
+        let mut out = vec![T::from_f64(0.0); xs.len()];
+        view.spline.sample_row(simd, &xs, &ys, &mut out);
+        let inside = |at: T, count: usize| (0.0..=count as f64 - 1.0).contains(&at.to_f64());
+        let usable = |x: T, y: T| {
+            inside(x, width)
+                && inside(y, height)
+                && view.usable.is_none_or(|mask| mask.get(x.to_f64() as usize, y.to_f64() as usize))
+        };
+        out.iter()
+            .zip(xs.iter().zip(&ys))
+            .map(|(v, (x, y))| if usable(*x, *y) { v.to_f64() } else { f64::NAN })
+            .collect()
+    };
+    (0..motion.height).into_par_iter().map(row).collect::<Vec<Vec<f64>>>().concat()
+}
+
+/// Sums of weights, of both brightnesses and of their squares.
+type Sums = [f64; 5];
+
+/// Gain and offset at the nodes.
+struct Fit {
+    columns: usize,
+    rows: usize,
+    /// Distance of the nodes, sites.
+    pitch: f64,
+    nodes: Vec<[f64; 2]>,
+}
+
+impl Fit {
+    /// `None` if a change does not explain the difference.
+    fn new((width, height): (usize, usize), known: &[f64], other: &[f64]) -> Option<Self> {
+        let pitch = width.max(height) as f64 / WINDOWS;
+        let count = |len: usize| ((len as f64 - 1.0) / pitch).ceil() as usize + 1;
+        let mut fit = Self { columns: count(width), rows: count(height), pitch, nodes: Vec::new() };
+        fit.nodes = vec![[1.0, 0.0]; fit.columns * fit.rows];
+        let before = fit.residual_std(width, known, other)?;
+        let mut scale = f64::INFINITY;
+        for _ in 0..ROUNDS {
+            fit.repeat(width, known, other, scale);
+            scale = fit.residual_std(width, known, other)?;
+        }
+        (scale < MAX_REMAINING * before).then_some(fit)
+    }
+
+    fn at(&self, width: usize, n: usize) -> [f64; 2] {
+        let ((x, along), (y, across)) =
+            (split((n % width) as f64 / self.pitch, self.columns), split((n / width) as f64 / self.pitch, self.rows));
+        let node = |x: usize, y: usize| self.nodes[y.min(self.rows - 1) * self.columns + x.min(self.columns - 1)];
+        let [a, b, c, d] = [node(x, y), node(x + 1, y), node(x, y + 1), node(x + 1, y + 1)];
+        [0, 1].map(|k| {
+            let (above, below) = (a[k] + along * (b[k] - a[k]), c[k] + along * (d[k] - c[k]));
+            above + across * (below - above)
+        })
+    }
+
+    fn residual(&self, width: usize, n: usize, known: f64, other: f64) -> f64 {
+        let [gain, offset] = self.at(width, n);
+        other - gain * known - offset
+    }
+
+    fn residual_std(&self, width: usize, known: &[f64], other: &[f64]) -> Option<f64> {
+        let residuals =
+            known.par_iter().zip(other).enumerate().map(|(n, (a, b))| self.residual(width, n, *a, *b).abs());
+        let mut residuals: Vec<f64> = residuals.filter(|r| r.is_finite()).collect();
+        if residuals.len() < MIN_PIXELS { None } else { robust_std(&mut residuals) }
+    }
+
+    /// Fits once, with robust weights for residuals of the standard deviation `scale`.
+    fn repeat(&mut self, width: usize, known: &[f64], other: &[f64], scale: f64) {
+        let inverse = 1.0 / (HALF_WEIGHT_RESIDUAL * scale).max(f64::MIN_POSITIVE);
+        let mut sums = vec![Sums::default(); self.nodes.len()];
+        let mut whole = Sums::default();
+        for (n, (a, b)) in known.iter().zip(other).enumerate().filter(|(_, (a, b))| (*a + *b).is_finite()) {
+            let weight = 1.0 / (1.0 + (self.residual(width, n, *a, *b) * inverse).powi(2));
+            let terms = [weight, weight * a, weight * b, weight * a * a, weight * b * b];
+            let ((x, along), (y, across)) = (
+                split((n % width) as f64 / self.pitch, self.columns),
+                split((n / width) as f64 / self.pitch, self.rows),
+            );
+            for (x, y, share) in [
+                (x, y, (1.0 - along) * (1.0 - across)),
+                (x + 1, y, along * (1.0 - across)),
+                (x, y + 1, (1.0 - along) * across),
+                (x + 1, y + 1, along * across),
+            ] {
+                let sums = &mut sums[y.min(self.rows - 1) * self.columns + x.min(self.columns - 1)];
+                sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += share * term);
+            }
+            whole.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+        }
+        let share = WHOLE_SHARE / self.nodes.len() as f64;
+        for (node, sums) in self.nodes.iter_mut().zip(&sums) {
+            let sums: Sums = std::array::from_fn(|k| sums[k] + share * whole[k]);
+            let [a, b, aa, bb] = [1, 2, 3, 4].map(|k| sums[k] / sums[0].max(f64::MIN_POSITIVE));
+            let gain = ((bb - b * b) / (aa - a * a)).sqrt().clamp(GAIN_BOUNDS[0], GAIN_BOUNDS[1]);
+            if gain.is_finite() {
+                *node = [gain, b - gain * a];
+            }
+        }
+    }
+
+    /// The map in units of the frames: brightness was `(I - mean) gain`.
+    fn map(&self, scale: f64, brightness: BrightnessScale) -> LightMap {
+        let nodes = self.nodes.iter();
+        let nodes = nodes.map(|&[gain, offset]| [gain, brightness.mean * (1.0 - gain) + offset / brightness.gain]);
+        LightMap {
+            columns: self.columns,
+            rows: self.rows,
+            scale: [1.0 / (scale * SITE_SPACING * self.pitch); 2],
+            nodes: nodes.collect(),
+        }
+    }
+}
