@@ -3,6 +3,7 @@ at all."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +27,7 @@ from benchmarks.settings import RECORDINGS, Setting
 
 Array = NDArray[np.floating]
 Row = dict[str, object]
+Readers = list[Callable[[Path], Sample]]
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,9 @@ ASKED = {
     "RubberWhale": Asked((0.18, 0.020), (0.14, 0.017)),
     "Dimetrodon": Asked((0.13, 0.0175), (0.11, 0.015)),
     "Yosemite without sky": Asked((0.085, 0.0123), (0.07, 0.010)),
+    "Urban2": Asked((0.43, 0.035), (0.36, 0.025)),
+    "Venus": Asked((0.29, 0.0235), (0.26, 0.020)),
+    "medium": Asked((1.75, 0.161), (1.68, 0.100)),
     "Sintel alley_1 clean": Asked((0.34, 0.038), (0.28, 0.030)),
     "PIV DNS_turbulence_00001": Asked((0.072, 0.016), (0.055, 0.013)),
     "PIV backstep_Re800_00001": Asked((0.038, 0.0034), (0.030, 0.0020)),
@@ -92,13 +97,13 @@ def frames_for(sample: Sample, setting: Setting) -> list[samples.Picture]:
     return sample.pair() if setting.frames == 2 else sample.frames
 
 
-def table(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
+def table(data: Path, ours: list[Setting] = RECORDINGS, readers: Readers = samples.FLOWS) -> list[Row]:
     """One row for each recording and method, reached beside `ASKED`; a missing recording has a row that
     says so."""
     if samples.cv2 is None:
         return [{"sample": "all", "method": "skipped: OpenCV, which reads the pictures, is missing"}]
     rows: list[Row] = []
-    found, missing = samples.read_all(samples.FLOWS, data)
+    found, missing = samples.read_all(readers, data)
     for sample in found:
         zero = np.zeros_like(sample.truth)
         rows.append(
@@ -177,6 +182,10 @@ def strain(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
 
 TABLES = {
     "flow": report.Table("Accuracy on recordings", lambda o: [] if o.data is None else table(o.data)),
+    "layered": report.Table(
+        "Accuracy at motion boundaries",
+        lambda o: [] if o.data is None else table(o.data, readers=samples.LAYERED),
+    ),
     "strain": report.Table(
         "Strain from image correlation", lambda o: [] if o.data is None else strain(o.data)
     ),

@@ -31,8 +31,8 @@ pub struct AnyFlowFilter {
 enum Filter {
     /// Before the first frame.
     Empty,
-    Single(FlowFilter<f32>),
-    Double(FlowFilter<f64>),
+    Single(Box<FlowFilter<f32>>),
+    Double(Box<FlowFilter<f64>>),
 }
 
 /// Runs `$body` with `$filter` bound to the filter of either precision, `$empty` before the first frame.
@@ -71,9 +71,9 @@ impl AnyFlowFilter {
         if matches!(self.filter, Filter::Empty) {
             let options = FlowFilterOptions { full_scale, ..self.options.clone() };
             self.filter = if self.precision.is_double(dtype) {
-                Filter::Double(FlowFilter::new(frame.size(), options)?)
+                Filter::Double(Box::new(FlowFilter::new(frame.size(), options)?))
             } else {
-                Filter::Single(FlowFilter::new(frame.size(), options)?)
+                Filter::Single(Box::new(FlowFilter::new(frame.size(), options)?))
             };
         }
         match self.dtype {
@@ -152,9 +152,9 @@ impl AnyFlowFilter {
     /// that was saved with other options.
     pub fn load(&mut self, path: &Path) -> Result<()> {
         let filter = if is_double(NpzReader::open(path)?)? {
-            Filter::Double(FlowFilter::load(path)?)
+            Filter::Double(Box::new(FlowFilter::load(path)?))
         } else {
-            Filter::Single(FlowFilter::load(path)?)
+            Filter::Single(Box::new(FlowFilter::load(path)?))
         };
         self.resume(filter, None)
     }
@@ -167,9 +167,9 @@ impl AnyFlowFilter {
     /// Replaces the state by that of [`to_bytes`](Self::to_bytes).
     pub fn restore(&mut self, bytes: &[u8], dtype: Option<&'static str>) -> Result<()> {
         let filter = if is_double(NpzReader::new(Cursor::new(bytes), "filter state")?)? {
-            Filter::Double(FlowFilter::from_bytes(bytes)?)
+            Filter::Double(Box::new(FlowFilter::from_bytes(bytes)?))
         } else {
-            Filter::Single(FlowFilter::from_bytes(bytes)?)
+            Filter::Single(Box::new(FlowFilter::from_bytes(bytes)?))
         };
         self.resume(filter, dtype)
     }
@@ -196,8 +196,8 @@ impl AnyFlowFilter {
         let threads = self.options.threads;
         self.filter = match filter {
             Filter::Empty => Filter::Empty,
-            Filter::Single(filter) => Filter::Single(filter.with_computation(threads, None)),
-            Filter::Double(filter) => Filter::Double(filter.with_computation(threads, None)),
+            Filter::Single(filter) => Filter::Single(Box::new(filter.with_computation(threads, None))),
+            Filter::Double(filter) => Filter::Double(Box::new(filter.with_computation(threads, None))),
         };
         self.dtype = dtype;
         Ok(())

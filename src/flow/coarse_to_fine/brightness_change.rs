@@ -3,10 +3,11 @@
 //! Along the motion, the brightness of frame `f` is `g(x) I(x) + o(x)`, with `I` that of the reference frame.
 //! Both are read from means and standard deviations in wide windows, which a wrong motion changes little (a
 //! regression would find too small a gain); pixels that do not follow, occluded ones say, have little weight.
-//! Frames are equalised only if that explains much of their difference, so that equal ones stay what they are.
+//! Frames are equalised only if that explains much of their difference, so that equal ones stay what they
+//! are.
 //!
-//! Before any motion is known, whole frames are compared ([`equalize_roughly`]): enough for the coarse levels,
-//! on whose motion the change is then measured.
+//! Before any motion is known, whole frames are compared ([`equalize_roughly`]): enough for the coarse
+//! levels, on whose motion the change is then measured.
 
 use super::brightness_scale::BrightnessScale;
 use super::data_term::View;
@@ -16,13 +17,14 @@ use crate::simd::{Level, SimdReal};
 use crate::types::{Frame, Mask};
 use rayon::prelude::*;
 
-/// Differences of whole frames that motion alone hardly makes: logarithm of the ratio of their standard deviations,
-/// and difference of their means over the standard deviation.
+/// Differences of whole frames that motion alone hardly makes: logarithm of the ratio of their standard
+/// deviations, and difference of their means over the standard deviation.
 const ROUGH_CHANGE: [f64; 2] = [0.1, 0.2];
 /// Approximate number of pixels of a frame that this is judged by.
 const ROUGH_SAMPLES: usize = 1000;
-/// Maximum standard deviation of the residual that remains, over that before, for a change to be removed.
-const MAX_REMAINING: f64 = 0.8;
+/// Maximum standard deviation of the residual that remains, over that before, for a change to be removed: of
+/// frames as they are, and of equalised ones, whose first change is only roughly known.
+const MAX_REMAINING: [f64; 2] = [0.8, 0.98];
 /// Windows along the longer side.
 const WINDOWS: f64 = 8.0;
 /// Weight of the whole picture in each window, over that of the window: windows may have no texture.
@@ -127,14 +129,14 @@ fn split(at: f64, count: usize) -> (usize, f64) {
     (first, (at - first as f64).clamp(0.0, 1.0))
 }
 
-/// Removes the change along the `motion` of a level of `size` pixels from the frames; `None` if there is none.
-/// `scale`: px of the frame per px of the level.
+/// Removes the change along the `motion` of a level of `size` pixels from the frames; `None` if there is
+/// none. `scale`: px of the frame per px of the level; `are_equalized`: whether frames were equalised before.
 pub(super) fn equalize_along<T: SimdReal>(
     simd: Level,
     frames: &[&Frame<T>],
     (views, brightness): (&[View<'_, T>], BrightnessScale),
     motion: &Planes<T>,
-    scale: f64,
+    (scale, are_equalized): (f64, bool),
 ) -> Option<Equalized<T>> {
     let samples: Vec<Vec<f64>> = views.iter().map(|view| sample(simd, view, motion)).collect();
     let known = &samples[reference(frames.len())];
@@ -143,7 +145,8 @@ pub(super) fn equalize_along<T: SimdReal>(
     let maps: Vec<LightMap> = samples
         .iter()
         .map(|other| {
-            let found = Fit::new(size, known, other)?.map(scale, brightness);
+            let most = MAX_REMAINING[usize::from(are_equalized)];
+            let found = Fit::new(size, known, other, most)?.map(scale, brightness);
             changes = true;
             Some(found)
         })
@@ -189,7 +192,7 @@ struct Fit {
 
 impl Fit {
     /// `None` if a change does not explain the difference.
-    fn new((width, height): (usize, usize), known: &[f64], other: &[f64]) -> Option<Self> {
+    fn new((width, height): (usize, usize), known: &[f64], other: &[f64], most: f64) -> Option<Self> {
         let pitch = width.max(height) as f64 / WINDOWS;
         let count = |len: usize| ((len as f64 - 1.0) / pitch).ceil() as usize + 1;
         let mut fit = Self { columns: count(width), rows: count(height), pitch, nodes: Vec::new() };
@@ -200,7 +203,7 @@ impl Fit {
             fit.repeat(width, known, other, scale);
             scale = fit.residual_std(width, known, other)?;
         }
-        (scale < MAX_REMAINING * before).then_some(fit)
+        (scale < most * before).then_some(fit)
     }
 
     fn at(&self, width: usize, n: usize) -> [f64; 2] {

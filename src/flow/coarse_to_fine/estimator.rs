@@ -18,7 +18,8 @@ use crate::flow::options::EstimatorOptions;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame};
 
-/// Maximum number of measurements of a change of brightness: the first rest on a motion between unequal frames.
+/// Maximum number of measurements of a change of brightness: the first rest on a motion between unequal
+/// frames.
 const MAX_MEASUREMENTS: usize = 4;
 
 #[derive(Debug)]
@@ -91,7 +92,8 @@ impl CoarseToFine {
             let coarse = plan.estimate_coarse_levels(workspace);
             let views = workspace.pyramid.levels()[level].views(ComparedFrames::All);
             let pixel = f64::from(1u32 << level);
-            let again = equalize_along(simd, compared, (&views, brightness), &coarse.motion, pixel);
+            let again =
+                equalize_along(simd, compared, (&views, brightness), &coarse.motion, (pixel, equalized.is_some()));
             measurements += 1;
             let noise_gain = equalized.as_ref().map_or(1.0, |equalized| equalized.noise_gain);
             let Some(again) = again.filter(|_| measurements < MAX_MEASUREMENTS) else {

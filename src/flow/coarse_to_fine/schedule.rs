@@ -23,8 +23,6 @@ pub(super) struct Schedule {
     pub searches: bool,
     /// Levels above the finest from which the unregularised trial is run (small objects); `None`: never.
     pub trial_from: Option<usize>,
-    /// Last iterations on the finest level before which the flow is sharpened at motion boundaries.
-    pub finest_sharpened: usize,
     /// Whether the motion one level above the finest is refined before it is carried down, for less noise.
     /// Not at half resolution, where that level has too few sites to choose windows.
     pub refines_intermediate: bool,
@@ -41,8 +39,6 @@ const COARSE_BREAK_STRAIN: f64 = 0.07;
 
 /// Maximum size, pixels, of the level on which blocks are searched for.
 const MAX_SEARCHED_PIXELS: usize = 20_000;
-/// Levels, from the finest up, on which the flow is sharpened at motion boundaries: coarser ones have few sites.
-const SHARPENED_LEVELS: usize = 3;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LevelSchedule {
@@ -54,8 +50,6 @@ pub(super) struct LevelSchedule {
     /// Whether blocks are searched for.
     pub searches: bool,
     pub refines: bool,
-    /// Iteration from which on the flow is sharpened at motion boundaries.
-    pub sharpens_from: usize,
 }
 
 impl Schedule {
@@ -73,7 +67,6 @@ impl Schedule {
                 finest_sweeps: 4,
                 searches: false,
                 trial_from: None,
-                finest_sharpened: 0,
                 refines_intermediate: false,
             },
             Preset::Balanced => Self {
@@ -85,7 +78,6 @@ impl Schedule {
                 finest_sweeps,
                 searches: true,
                 trial_from: Some(2),
-                finest_sharpened: 1,
                 refines_intermediate: true,
             },
             Preset::Accurate => Self {
@@ -97,7 +89,6 @@ impl Schedule {
                 finest_sweeps: smoothness.sweeps,
                 searches: true,
                 trial_from: Some(2),
-                finest_sharpened: usize::MAX,
                 refines_intermediate: true,
             },
         }
@@ -126,7 +117,8 @@ impl Schedule {
         LevelSchedule { runs_trial, refines, ..self.up_to(k, max_iterations) }
     }
 
-    /// The level on which blocks are searched for: the finest that is small enough, but not the finest of all.
+    /// The level on which blocks are searched for: the finest that is small enough, but not the finest of
+    /// all.
     pub fn searched_level(&self, sizes: impl Iterator<Item = (usize, usize)>) -> Option<usize> {
         let is_small = |(_, (width, height)): &(usize, (usize, usize))| width * height <= MAX_SEARCHED_PIXELS;
         let (found, _) = sizes.enumerate().skip(self.finest_level + 1).find(is_small)?;
@@ -145,11 +137,6 @@ impl Schedule {
             runs_trial: false,
             searches: false,
             refines: false,
-            sharpens_from: match k {
-                _ if k <= self.finest_level => max_iterations.saturating_sub(self.finest_sharpened),
-                _ if k < self.finest_level + SHARPENED_LEVELS => 1,
-                _ => usize::MAX,
-            },
         }
     }
 }

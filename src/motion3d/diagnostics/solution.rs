@@ -45,6 +45,7 @@ pub(crate) struct Solution {
 impl Solution {
     /// Maximum likelihood, and what became of the smoothed weights, which were `wanted` or only needed for
     /// maximum likelihood's covariance.
+    #[expect(clippy::large_types_passed_by_value, reason = "all of it becomes part of the solution")]
     pub fn new(
         minimum: Minimum,
         plugged: Option<PluginCovariances>,

@@ -166,7 +166,9 @@ impl Observations {
     /// Which points are `chosen`, by index among these.
     pub fn mask(&self, chosen: &[u32]) -> Vec<bool> {
         let mut mask = vec![false; self.n];
-        chosen.iter().for_each(|&k| mask[k as usize] = true);
+        for &k in chosen {
+            mask[k as usize] = true;
+        }
         mask
     }
 

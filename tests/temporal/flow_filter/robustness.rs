@@ -7,6 +7,9 @@ use jacoflow::synth::{SceneOptions, Sensor, build};
 const SIZE: usize = 56;
 const SPOILT: usize = 40;
 
+/// Errors of the six unknowns in standard deviations, and the status.
+type SiteScore = ([f64; 6], Status);
+
 /// What happens at frame [`SPOILT`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Event {
@@ -55,7 +58,7 @@ impl Sequence {
     }
 
     /// Errors of the six unknowns in standard deviations and the status, by site, after `frames` frames.
-    fn scores(&self, profile: &str, frames: usize) -> Vec<(usize, Vec<([f64; 6], Status)>)> {
+    fn scores(&self, profile: &str, frames: usize) -> Vec<(usize, Vec<SiteScore>)> {
         let region = Rect { x: 12, y: 12, width: SIZE - 24, height: SIZE - 24 };
         let sites = SamplingGrid::Grid { region: Some(region), stride: 4 };
         let base = FlowFilterOptions::profile(profile).unwrap();
@@ -79,7 +82,7 @@ impl Sequence {
 }
 
 /// Mean of `value` over sites.
-fn share(sites: &[([f64; 6], Status)], value: impl Fn(&([f64; 6], Status)) -> bool) -> f64 {
+fn share(sites: &[SiteScore], value: impl Fn(&SiteScore) -> bool) -> f64 {
     sites.iter().filter(|site| value(site)).count() as f64 / sites.len() as f64
 }
 
@@ -108,7 +111,7 @@ fn one_spoilt_frame_is_reported_and_forgotten_within_ten() {
         for event in [Event::Black, Event::Bright, Event::Flash, Event::Dropped, Event::Repeated] {
             for (seed, carrier) in [(111, "noise"), (112, "speckle"), (113, "particles")] {
                 let scores = Sequence::new(carrier, (0.5, -0.4), seed, event).scores(profile, SPOILT + 20);
-                let is_lost = |(error, _): &([f64; 6], Status)| error[..2].iter().any(|&e| e >= 3.0);
+                let is_lost = |(error, _): &SiteScore| error[..2].iter().any(|&e| e >= 3.0);
                 let usual = share(&scores[SPOILT - 1].1, is_lost) + 0.05;
                 for (t, sites) in &scores[SPOILT..] {
                     let silent = share(sites, |site| site.1 == Status::Ok && is_lost(site));

@@ -1,8 +1,9 @@
 //! Matches of blocks for motions that linearisation does not find: farther than a grain of the texture.
 //!
-//! On one coarse level each textured block whose present motion does not correlate with the next frame is searched
-//! for all around, by zero-mean normalised cross-correlation (J. P. Lewis, "Fast normalized cross-correlation",
-//! 1995). Sites take what was found where it leaves less residual energy ([`super::comparison`]).
+//! On one coarse level each textured block whose present motion does not correlate with the next frame is
+//! searched for all around, by zero-mean normalised cross-correlation (J. P. Lewis, "Fast normalized
+//! cross-correlation", 1995). Sites take what was found where it leaves less residual energy
+//! ([`super::comparison`]).
 
 use crate::flow::coarse_to_fine::data_term::View;
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
@@ -133,12 +134,16 @@ impl<T: SimdReal> Search<'_, T> {
 fn template(picture: &Frame<f32>, (x, y): (usize, usize)) -> Option<Vec<f32>> {
     let mut block: Vec<f32> = (y..y + SIDE).flat_map(|y| picture.row(y)[x..x + SIDE].to_vec()).collect();
     let mean = block.iter().sum::<f32>() / block.len() as f32;
-    block.iter_mut().for_each(|value| *value -= mean);
+    for value in &mut block {
+        *value -= mean;
+    }
     let norm = block.iter().map(|value| value * value).sum::<f32>().sqrt();
     if norm <= MIN_CONTRAST * SIDE as f32 {
         return None;
     }
-    block.iter_mut().for_each(|value| *value /= norm);
+    for value in &mut block {
+        *value /= norm;
+    }
     Some(block)
 }
 

@@ -16,9 +16,9 @@ use crate::types::Frame;
 const MIDWAY_STEPS: usize = 3;
 
 impl DescentPlan {
-    /// The `own` result on the coarse level, with the `given` flow where the frames agree better with it; and the
-    /// number of iterations that both need together. `midway`: motion is estimated midway between two frames,
-    /// the flow given at the first.
+    /// The `own` result on the coarse level, with the `given` flow where the frames agree better with it; and
+    /// the number of iterations that both need together. `midway`: motion is estimated midway between two
+    /// frames, the flow given at the first.
     pub fn with_given<T: SimdReal>(
         &self,
         workspace: &mut Workspace<T>,

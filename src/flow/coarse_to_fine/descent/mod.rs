@@ -1,16 +1,14 @@
 //! Descent through the pyramid: iterations on each level, from the coarsest to the finest.
 //!
-//! `weighted_median` sharpens the flow at motion boundaries before an iteration; `iteration` is one linearisation
-//! with its regularised solution, and the unregularised trial; `block_matches` finds large motions;
-//! `comparison` takes the better of two motions at each site; `intermediate` refines a level before the next
-//! one; `given` lets a flow from elsewhere compete.
+//! `iteration` is one linearisation with its regularised solution, and the unregularised trial;
+//! `block_matches` finds large motions; `comparison` takes the better of two motions at each site;
+//! `intermediate` refines a level before the next one; `given` lets a flow from elsewhere compete.
 
 mod block_matches;
 pub(super) mod comparison;
 mod given;
 mod intermediate;
 mod iteration;
-mod weighted_median;
 
 use super::brightness_scale::BrightnessScale;
 use super::data_term::{COUNT, DataOptions, DataTerm, MOTION, summary};
@@ -25,7 +23,6 @@ use comparison::Comparison;
 use intermediate::refine_intermediate;
 use iteration::{Iteration, copy, has_settled};
 use std::ops::RangeInclusive;
-use weighted_median::{Deviations, weighted_median};
 
 /// Levels from the coarse level down to the finest.
 const LEVELS_ABOVE: usize = 2;
@@ -59,7 +56,8 @@ impl<T: SimdReal> DescentResult<T> {
 }
 
 impl DescentPlan {
-    /// The level on which brightness is compared and a given flow competes: errors are smaller than structure.
+    /// The level on which brightness is compared and a given flow competes: errors are smaller than
+    /// structure.
     pub fn coarse_level<T: SimdReal>(&self, workspace: &Workspace<T>) -> usize {
         (self.finest + LEVELS_ABOVE).min(workspace.pyramid.levels().len() - 1)
     }
@@ -163,8 +161,8 @@ impl DescentPlan {
         }
     }
 
-    /// Descends from the coarsest level that has a schedule, on which the motion and the standard deviation of the
-    /// residual, if known, are given, to the level `to`.
+    /// Descends from the coarsest level that has a schedule, on which the motion and the standard deviation
+    /// of the residual, if known, are given, to the level `to`.
     fn descend<T: SimdReal>(
         &self,
         workspace: &mut Workspace<T>,
@@ -184,11 +182,7 @@ impl DescentPlan {
                 std::mem::swap(&mut motion, &mut old);
                 finer(self.simd, &old, level.size, &mut motion);
             }
-            for n in 0..schedule.max_iterations {
-                if let Some(residual) = step.residual_std.filter(|_| n >= schedule.sharpens_from) {
-                    let deviations = Deviations { brightness: self.brightness.contrast, residual: residual.to_f64() };
-                    weighted_median(self.simd, space, &level.views(compared), deviations, &mut motion);
-                }
+            for _ in 0..schedule.max_iterations {
                 let change = step.advance(level, &schedule.smoothness, (&mut motion, &mut old));
                 // The finest level does not wait for objects: coarser levels have found them.
                 let is_calm = || k == self.finest || has_settled(&old, &motion);
