@@ -194,12 +194,6 @@ impl Derotation {
         Rows::plane((from + 0.5 * way).into()).r * (1.0 - change)
     }
 
-    /// Where the first view's place `(x, y, 0)` is seen with half of the rotation, `(x, y, 1)`; `None` behind
-    /// the camera.
-    pub fn first_end(&self, [x, y, _]: [f64; 3]) -> Option<Vector3<f64>> {
-        pictured(&self.half, [x, y]).map(|(at, _)| at.push(1.0))
-    }
-
     /// The displacement from `first` to `second`, places on the plane at distance 1, without the rotation;
     /// `None` where that leads behind the camera.
     pub fn out_of(&self, first: [f64; 2], second: [f64; 2]) -> Option<DerotatedFlow> {
@@ -237,7 +231,12 @@ impl Derotation {
 
     /// Inverse depths half way in time from those in the rows, for the translation `u`.
     pub fn half_way(&self, u: &Vector3<f64>) -> MidpointDepth {
-        MidpointDepth { ahead: self.lag * self.rotation.cross(u).z - 0.5 * (self.mean * u).z }
+        MidpointDepth { ahead: self.lag * self.rotation.cross(u).z + self.middle(u).ahead }
+    }
+
+    /// Those half way between both ends.
+    pub fn middle(&self, u: &Vector3<f64>) -> MidpointDepth {
+        MidpointDepth { ahead: -0.5 * (self.mean * u).z }
     }
 }
 
@@ -245,7 +244,8 @@ impl Derotation {
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct MidpointDepth {
     /// How much farther along the optical axis a point is there than at the second end, in units of `|u|`:
-    /// `(X_1' + X_2') / 2 + (1 - cos(a / 2)) / a^2 (w x u)` with `X_1' = X_2' - t`.
+    /// `(X_1' + X_2') / 2 = X_2' - t / 2` half way between both ends, and half way in time `(X_1' + X_2') / 2
+    /// + (1 - cos(a / 2)) / a^2 (w x u)`.
     ahead: f64,
 }
 
