@@ -23,7 +23,7 @@ const MIN_CORRELATION: f32 = 0.65;
 /// Minimum standard deviation of a block, scaled grey levels.
 const MIN_CONTRAST: f32 = 1.0;
 /// Minimum distance, px of the level, of a match from the present motion: iterations find nearer ones.
-const MIN_DISTANCE: f32 = 1.5;
+const MIN_DISTANCE: f32 = 5.0;
 
 /// The motion with what was found for whole blocks; `None` if nothing was.
 pub(super) fn block_matches<T: SimdReal>(
