@@ -25,8 +25,9 @@ const ROUGH_SAMPLES: usize = 1000;
 /// Maximum standard deviation of the residual that remains, over that before, for a change to be removed: of
 /// frames as they are, and of equalised ones, whose first change is only roughly known.
 const MAX_REMAINING: [f64; 2] = [0.8, 0.98];
-/// Windows along the longer side.
+/// Windows along the longer side, and their minimum distance, sites: each needs enough of them.
 const WINDOWS: f64 = 8.0;
+const MIN_PITCH: f64 = 12.0;
 /// Weight of the whole picture in each window, over that of the window: windows may have no texture.
 const WHOLE_SHARE: f64 = 0.1;
 /// Repetitions of the fit with robust weights.
@@ -193,7 +194,7 @@ struct Fit {
 impl Fit {
     /// `None` if a change does not explain the difference.
     fn new((width, height): (usize, usize), known: &[f64], other: &[f64], most: f64) -> Option<Self> {
-        let pitch = width.max(height) as f64 / WINDOWS;
+        let pitch = (width.max(height) as f64 / WINDOWS).max(MIN_PITCH);
         let count = |len: usize| ((len as f64 - 1.0) / pitch).ceil() as usize + 1;
         let mut fit = Self { columns: count(width), rows: count(height), pitch, nodes: Vec::new() };
         fit.nodes = vec![[1.0, 0.0]; fit.columns * fit.rows];
