@@ -18,6 +18,7 @@ from benchmarks import report
 
 SECTIONS: dict[str, tuple[str, ...]] = {
     "flow": ("flow",),
+    "disturbed": ("disturbed",),
     "memory": ("memory",),
     "filter": ("filter", "flow_filter"),
     "controlled": ("controlled",),

@@ -101,24 +101,27 @@ def _piv(name: str) -> Callable[[Path], Sample]:
     return read
 
 
-def _layered(name: str, frames: tuple[str, ...], truth: str) -> Callable[[Path], Sample]:
+def _layered(name: str, place: str, frames: tuple[str, ...], truth: str) -> Callable[[Path], Sample]:
     def read(data: Path) -> Sample:
-        folder = data / name
+        folder = data / place
         pictures = [read_grey(folder / frame) for frame in frames]
-        return Sample(folder.name, pictures, len(frames) - 2, read_flo(folder / truth))
+        return Sample(name, pictures, len(frames) - 2, read_flo(folder / truth))
 
-    read.__name__ = f"_{name.replace('/', ' ')}"
+    read.__name__ = f"_{name}"
     return read
 
 
 LAYERED: list[Callable[[Path], Sample]] = [
-    _layered("middlebury_flow/Urban2", ("frame09.png", "frame10.png", "frame11.png"), "flow10.flo"),
-    _layered("middlebury_flow/Venus", ("frame10.png", "frame11.png"), "flow10.flo"),
+    _layered("Urban2", "middlebury_flow/Urban2", ("frame09.png", "frame10.png", "frame11.png"), "flow10.flo"),
+    _layered("Venus", "middlebury_flow/Venus", ("frame10.png", "frame11.png"), "flow10.flo"),
     _layered(
-        "sintel/final/medium", ("frame_0001.png", "frame_0002.png", "frame_0003.png"), "gt/frame_0002.flo"
+        "Sintel cave_2 final",
+        "sintel/final/medium",
+        ("frame_0001.png", "frame_0002.png", "frame_0003.png"),
+        "gt/frame_0002.flo",
     ),
 ]
-"""Recordings with large jumps of the flow at motion boundaries: Urban2, Venus, and Sintel's cave_2 (final)."""
+"""Recordings with large jumps of the flow at motion boundaries."""
 
 FLOWS: list[Callable[[Path], Sample]] = [
     _rubber_whale,

@@ -121,7 +121,7 @@ def textures(seeds: tuple[int, ...]) -> list[Row]:
 
 def spoilt(seeds: tuple[int, ...]) -> list[Row]:
     """Shares of sites with u or v more than three standard deviations off: in the worst of ten frames from
-    the spoilt one on and status OK, and after ten frames whatever the status."""
+    the spoilt one on and status OK, and after ten frames with any status."""
     rows: list[Row] = []
     for profile in PROFILES:
         for event in EVENTS:

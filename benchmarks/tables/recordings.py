@@ -50,7 +50,7 @@ ASKED = {
     "Yosemite without sky": Asked((0.085, 0.0123), (0.07, 0.010)),
     "Urban2": Asked((0.43, 0.035), (0.36, 0.025)),
     "Venus": Asked((0.29, 0.0235), (0.26, 0.020)),
-    "medium": Asked((1.75, 0.161), (1.68, 0.100)),
+    "Sintel cave_2 final": Asked((1.75, 0.161), (1.68, 0.100)),
     "Sintel alley_1 clean": Asked((0.34, 0.038), (0.28, 0.030)),
     "PIV DNS_turbulence_00001": Asked((0.072, 0.016), (0.055, 0.013)),
     "PIV backstep_Re800_00001": Asked((0.038, 0.0034), (0.030, 0.0020)),

@@ -97,7 +97,7 @@ impl<T: SimdReal> Kernel<T> for Measure<'_, T> {
                     left = z.mul_add(z, left);
                 }
                 jet[0] = jet[0] + base;
-                // Zero for finite numbers, NaN for others, whatever their weights.
+                // Zero for finite numbers, NaN for others, with any weights.
                 let mut spoilt = zero * left;
                 for k in 0..6 {
                     spoilt = zero.mul_add(jet[k], spoilt);

@@ -12,12 +12,13 @@
 use super::brightness_scale::BrightnessScale;
 use super::data_term::View;
 use super::planes::{Planes, SITE_SPACING};
+use crate::ablation::keeps;
 use crate::math::robust_std;
 use crate::simd::{Level, SimdReal};
 use crate::types::{Frame, Mask};
 use rayon::prelude::*;
 
-/// Differences of whole frames that motion alone hardly makes: logarithm of the ratio of their standard
+/// Differences of whole frames that motion alone rarely makes: logarithm of the ratio of their standard
 /// deviations, and difference of their means over the standard deviation.
 const ROUGH_CHANGE: [f64; 2] = [0.1, 0.2];
 /// Approximate number of pixels of a frame that this is judged by.
@@ -50,7 +51,8 @@ pub(super) fn equalize_roughly<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&
         frames.iter().map(|frame| BrightnessScale::of_samples(&[*frame], mask, ROUGH_SAMPLES)).collect();
     let known = scales[reference(frames.len())];
     let std = |scale: &BrightnessScale| scale.contrast / scale.gain;
-    if frames[0].data().len() < MIN_PIXELS || scales.iter().any(|scale| scale.contrast <= 0.0) {
+    let is_off = !keeps("flow.brightness_change") || frames[0].data().len() < MIN_PIXELS;
+    if is_off || scales.iter().any(|scale| scale.contrast <= 0.0) {
         return None;
     }
     let differs = |scale: &BrightnessScale| {
@@ -88,35 +90,47 @@ fn equalize<T: SimdReal>(frames: &[&Frame<T>], maps: &[LightMap]) -> Equalized<T
     Equalized { frames: frames.iter().zip(maps).map(|(frame, map)| map.remove_from(frame)).collect(), noise_gain }
 }
 
-/// Gain and offset on a grid over the frame, bilinear between the nodes.
+/// Gain and offset on a grid, bilinear between the nodes.
 struct LightMap {
     columns: usize,
     rows: usize,
-    /// Nodes per px of the frame.
-    scale: [f64; 2],
+    /// Distance of the nodes, px of the frame or sites.
+    pitch: f64,
     nodes: Vec<[f64; 2]>,
 }
 
 impl LightMap {
     fn constant(node: [f64; 2]) -> Self {
-        Self { columns: 1, rows: 1, scale: [0.0; 2], nodes: vec![node] }
+        Self { columns: 1, rows: 1, pitch: f64::INFINITY, nodes: vec![node] }
+    }
+
+    /// The nodes around a position, and the share of each.
+    fn around(&self, x: f64, y: f64) -> [(usize, f64); 4] {
+        let split = |at: f64, count: usize| {
+            let at = at / self.pitch;
+            let first = (at as usize).min(count.saturating_sub(2));
+            (first, (first + 1).min(count - 1), (at - first as f64).clamp(0.0, 1.0))
+        };
+        let ((left, right, along), (above, below, across)) = (split(x, self.columns), split(y, self.rows));
+        let node = |x: usize, y: usize| y * self.columns + x;
+        [
+            (node(left, above), (1.0 - along) * (1.0 - across)),
+            (node(right, above), along * (1.0 - across)),
+            (node(left, below), (1.0 - along) * across),
+            (node(right, below), along * across),
+        ]
+    }
+
+    fn at(&self, x: f64, y: f64) -> [f64; 2] {
+        let around = self.around(x, y);
+        [0, 1].map(|k| around.iter().map(|&(node, share)| share * self.nodes[node][k]).sum())
     }
 
     fn remove_from<T: SimdReal>(&self, frame: &Frame<T>) -> Frame<T> {
         let mut out = frame.clone();
-        let width = frame.width().max(1);
-        let along: Vec<(usize, f64)> = (0..width).map(|x| split(x as f64 * self.scale[0], self.columns)).collect();
-        out.data_mut().par_chunks_mut(width).enumerate().for_each(|(y, row)| {
-            let (first, share) = split(y as f64 * self.scale[1], self.rows);
-            let line: Vec<[f64; 2]> = (0..self.columns)
-                .map(|x| {
-                    let [a, b] = [first, (first + 1).min(self.rows - 1)].map(|y| self.nodes[y * self.columns + x]);
-                    [0, 1].map(|k| a[k] + share * (b[k] - a[k]))
-                })
-                .collect();
-            for (value, &(at, share)) in row.iter_mut().zip(&along) {
-                let (a, b) = (line[at], line[(at + 1).min(self.columns - 1)]);
-                let [gain, offset] = [0, 1].map(|k| a[k] + share * (b[k] - a[k]));
+        out.data_mut().par_chunks_mut(frame.width().max(1)).enumerate().for_each(|(y, row)| {
+            for (x, value) in row.iter_mut().enumerate() {
+                let [gain, offset] = self.at(x as f64, y as f64);
                 *value = T::from_f64((value.to_f64() - offset) / gain);
             }
         });
@@ -124,14 +138,8 @@ impl LightMap {
     }
 }
 
-/// Node before a position, and the share of the next.
-fn split(at: f64, count: usize) -> (usize, f64) {
-    let first = (at as usize).min(count.saturating_sub(2));
-    (first, (at - first as f64).clamp(0.0, 1.0))
-}
-
-/// Removes the change along the `motion` of a level of `size` pixels from the frames; `None` if there is
-/// none. `scale`: px of the frame per px of the level; `are_equalized`: whether frames were equalised before.
+/// Removes the change along the `motion` of a level from the frames; `None` if there is none. `scale`: px of
+/// the frame per px of the level; `are_equalized`: whether frames were equalised before.
 pub(super) fn equalize_along<T: SimdReal>(
     simd: Level,
     frames: &[&Frame<T>],
@@ -142,18 +150,15 @@ pub(super) fn equalize_along<T: SimdReal>(
     let samples: Vec<Vec<f64>> = views.iter().map(|view| sample(simd, view, motion)).collect();
     let known = &samples[reference(frames.len())];
     let size = (motion.width, motion.height);
-    let mut changes = false;
-    let maps: Vec<LightMap> = samples
-        .iter()
-        .map(|other| {
-            let most = MAX_REMAINING[usize::from(are_equalized)];
-            let found = Fit::new(size, known, other, most)?.map(scale, brightness);
-            changes = true;
-            Some(found)
-        })
-        .map(|map| map.unwrap_or_else(|| LightMap::constant([1.0, 0.0])))
-        .collect();
-    changes.then(|| equalize(frames, &maps))
+    let most = MAX_REMAINING[usize::from(are_equalized)];
+    let found: Vec<Option<LightMap>> = samples.iter().map(|other| fit(size, known, other, most)).collect();
+    if found.iter().all(Option::is_none) || !keeps("flow.brightness_change") {
+        return None;
+    }
+    let map = |found: Option<LightMap>| {
+        found.map_or(LightMap::constant([1.0, 0.0]), |map| in_frames(map, scale * SITE_SPACING, brightness))
+    };
+    Some(equalize(frames, &found.into_iter().map(map).collect::<Vec<_>>()))
 }
 
 /// Brightness of a view at the sites, along the motion; NaN beyond the frame.
@@ -179,100 +184,59 @@ fn sample<T: SimdReal>(simd: Level, view: &View<'_, T>, motion: &Planes<T>) -> V
     (0..motion.height).into_par_iter().map(row).collect::<Vec<Vec<f64>>>().concat()
 }
 
-/// Sums of weights, of both brightnesses and of their squares.
-type Sums = [f64; 5];
-
-/// Gain and offset at the nodes.
-struct Fit {
-    columns: usize,
-    rows: usize,
-    /// Distance of the nodes, sites.
-    pitch: f64,
-    nodes: Vec<[f64; 2]>,
+/// Gain and offset of the `other` brightness over the `known` one, on the sites; `None` if more than the share
+/// `most` of the difference remains.
+fn fit((width, height): (usize, usize), known: &[f64], other: &[f64], most: f64) -> Option<LightMap> {
+    let pitch = (width.max(height) as f64 / WINDOWS).max(MIN_PITCH);
+    let [columns, rows] = [width, height].map(|len| ((len as f64 - 1.0) / pitch).ceil() as usize + 1);
+    let mut map = LightMap { columns, rows, pitch, nodes: vec![[1.0, 0.0]; columns * rows] };
+    let before = residual_std(&map, width, known, other)?;
+    let mut scale = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        improve(&mut map, width, (known, other), scale);
+        scale = residual_std(&map, width, known, other)?;
+    }
+    (scale < most * before).then_some(map)
 }
 
-impl Fit {
-    /// `None` if a change does not explain the difference.
-    fn new((width, height): (usize, usize), known: &[f64], other: &[f64], most: f64) -> Option<Self> {
-        let pitch = (width.max(height) as f64 / WINDOWS).max(MIN_PITCH);
-        let count = |len: usize| ((len as f64 - 1.0) / pitch).ceil() as usize + 1;
-        let mut fit = Self { columns: count(width), rows: count(height), pitch, nodes: Vec::new() };
-        fit.nodes = vec![[1.0, 0.0]; fit.columns * fit.rows];
-        let before = fit.residual_std(width, known, other)?;
-        let mut scale = f64::INFINITY;
-        for _ in 0..ROUNDS {
-            fit.repeat(width, known, other, scale);
-            scale = fit.residual_std(width, known, other)?;
+fn residual(map: &LightMap, width: usize, n: usize, (known, other): (f64, f64)) -> f64 {
+    let [gain, offset] = map.at((n % width) as f64, (n / width) as f64);
+    other - gain * known - offset
+}
+
+fn residual_std(map: &LightMap, width: usize, known: &[f64], other: &[f64]) -> Option<f64> {
+    let residuals = known.par_iter().zip(other).enumerate();
+    let residuals = residuals.map(|(n, (a, b))| residual(map, width, n, (*a, *b)).abs());
+    let mut residuals: Vec<f64> = residuals.filter(|residual| residual.is_finite()).collect();
+    if residuals.len() < MIN_PIXELS { None } else { robust_std(&mut residuals) }
+}
+
+/// Fits once, with robust weights for residuals of the standard deviation `scale`.
+fn improve(map: &mut LightMap, width: usize, (known, other): (&[f64], &[f64]), scale: f64) {
+    let inverse = 1.0 / (HALF_WEIGHT_RESIDUAL * scale).max(f64::MIN_POSITIVE);
+    // Of weights, of both brightnesses and of their squares.
+    let (mut sums, mut whole) = (vec![[0.0; 5]; map.nodes.len()], [0.0; 5]);
+    for (n, (a, b)) in known.iter().zip(other).enumerate().filter(|(_, (a, b))| (*a + *b).is_finite()) {
+        let weight = 1.0 / (1.0 + (residual(map, width, n, (*a, *b)) * inverse).powi(2));
+        let terms = [weight, weight * a, weight * b, weight * a * a, weight * b * b];
+        for (node, share) in map.around((n % width) as f64, (n / width) as f64) {
+            sums[node].iter_mut().zip(terms).for_each(|(sum, term)| *sum += share * term);
         }
-        (scale < most * before).then_some(fit)
+        whole.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
     }
-
-    fn at(&self, width: usize, n: usize) -> [f64; 2] {
-        let ((x, along), (y, across)) =
-            (split((n % width) as f64 / self.pitch, self.columns), split((n / width) as f64 / self.pitch, self.rows));
-        let node = |x: usize, y: usize| self.nodes[y.min(self.rows - 1) * self.columns + x.min(self.columns - 1)];
-        let [a, b, c, d] = [node(x, y), node(x + 1, y), node(x, y + 1), node(x + 1, y + 1)];
-        [0, 1].map(|k| {
-            let (above, below) = (a[k] + along * (b[k] - a[k]), c[k] + along * (d[k] - c[k]));
-            above + across * (below - above)
-        })
-    }
-
-    fn residual(&self, width: usize, n: usize, known: f64, other: f64) -> f64 {
-        let [gain, offset] = self.at(width, n);
-        other - gain * known - offset
-    }
-
-    fn residual_std(&self, width: usize, known: &[f64], other: &[f64]) -> Option<f64> {
-        let residuals =
-            known.par_iter().zip(other).enumerate().map(|(n, (a, b))| self.residual(width, n, *a, *b).abs());
-        let mut residuals: Vec<f64> = residuals.filter(|r| r.is_finite()).collect();
-        if residuals.len() < MIN_PIXELS { None } else { robust_std(&mut residuals) }
-    }
-
-    /// Fits once, with robust weights for residuals of the standard deviation `scale`.
-    fn repeat(&mut self, width: usize, known: &[f64], other: &[f64], scale: f64) {
-        let inverse = 1.0 / (HALF_WEIGHT_RESIDUAL * scale).max(f64::MIN_POSITIVE);
-        let mut sums = vec![Sums::default(); self.nodes.len()];
-        let mut whole = Sums::default();
-        for (n, (a, b)) in known.iter().zip(other).enumerate().filter(|(_, (a, b))| (*a + *b).is_finite()) {
-            let weight = 1.0 / (1.0 + (self.residual(width, n, *a, *b) * inverse).powi(2));
-            let terms = [weight, weight * a, weight * b, weight * a * a, weight * b * b];
-            let ((x, along), (y, across)) = (
-                split((n % width) as f64 / self.pitch, self.columns),
-                split((n / width) as f64 / self.pitch, self.rows),
-            );
-            for (x, y, share) in [
-                (x, y, (1.0 - along) * (1.0 - across)),
-                (x + 1, y, along * (1.0 - across)),
-                (x, y + 1, (1.0 - along) * across),
-                (x + 1, y + 1, along * across),
-            ] {
-                let sums = &mut sums[y.min(self.rows - 1) * self.columns + x.min(self.columns - 1)];
-                sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += share * term);
-            }
-            whole.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-        }
-        let share = WHOLE_SHARE / self.nodes.len() as f64;
-        for (node, sums) in self.nodes.iter_mut().zip(&sums) {
-            let sums: Sums = std::array::from_fn(|k| sums[k] + share * whole[k]);
-            let [a, b, aa, bb] = [1, 2, 3, 4].map(|k| sums[k] / sums[0].max(f64::MIN_POSITIVE));
-            let gain = ((bb - b * b) / (aa - a * a)).sqrt().clamp(GAIN_BOUNDS[0], GAIN_BOUNDS[1]);
-            if gain.is_finite() {
-                *node = [gain, b - gain * a];
-            }
+    let share = WHOLE_SHARE / map.nodes.len() as f64;
+    for (node, sums) in map.nodes.iter_mut().zip(&sums) {
+        let sums: [f64; 5] = std::array::from_fn(|k| sums[k] + share * whole[k]);
+        let [a, b, aa, bb] = [1, 2, 3, 4].map(|k| sums[k] / sums[0].max(f64::MIN_POSITIVE));
+        let gain = ((bb - b * b) / (aa - a * a)).sqrt().clamp(GAIN_BOUNDS[0], GAIN_BOUNDS[1]);
+        if gain.is_finite() {
+            *node = [gain, b - gain * a];
         }
     }
+}
 
-    /// The map in units of the frames: brightness was `(I - mean) gain`.
-    fn map(&self, scale: f64, brightness: BrightnessScale) -> LightMap {
-        let nodes = self.nodes.iter();
-        let nodes = nodes.map(|&[gain, offset]| [gain, brightness.mean * (1.0 - gain) + offset / brightness.gain]);
-        LightMap {
-            columns: self.columns,
-            rows: self.rows,
-            scale: [1.0 / (scale * SITE_SPACING * self.pitch); 2],
-            nodes: nodes.collect(),
-        }
-    }
+/// A map on sites, of brightness `(I - mean) gain`, in units of the frames; `site`: distance of sites, px.
+fn in_frames(map: LightMap, site: f64, brightness: BrightnessScale) -> LightMap {
+    let node = |&[gain, offset]: &[f64; 2]| [gain, brightness.mean * (1.0 - gain) + offset / brightness.gain];
+    LightMap { pitch: site * map.pitch, nodes: map.nodes.iter().map(node).collect(), ..map }
 }

@@ -25,28 +25,26 @@ const MIN_CONTRAST: f32 = 1.0;
 /// Minimum distance, px of the level, of a match from the present motion: iterations find nearer ones.
 const MIN_DISTANCE: f32 = 5.0;
 
-/// The motion with what was found for whole blocks; `None` if nothing was.
+/// Writes what is found for whole blocks to `found`, a copy of the `motion`; returns whether anything was.
 pub(super) fn block_matches<T: SimdReal>(
     simd: Level,
     views: &[View<'_, T>],
     motion: &Planes<T>,
-    mut found: Planes<T>,
-) -> Result<Planes<T>, Planes<T>> {
-    let [.., from, to] = views else { return Err(found) };
+    found: &mut Planes<T>,
+) -> bool {
+    let [.., from, to] = views else { return false };
     let pictures = [from, to].map(|view| picture(simd, view));
     let (width, height) = pictures[0].size();
     if width < 2 * SIDE || height < 2 * SIDE {
-        return Err(found);
+        return false;
     }
     let corners =
         (0..=height - SIDE).step_by(SPACING).flat_map(|y| (0..=width - SIDE).step_by(SPACING).map(move |x| (x, y)));
     let search = Search { simd, pictures: &pictures, motion, time: from.time.to_f64() as f32 };
     let mut matches: Vec<Match> =
         corners.collect::<Vec<_>>().into_par_iter().filter_map(|corner| search.block(corner)).collect();
-    if matches.is_empty() {
-        return Err(found);
-    }
     // The best is written last.
+    let is_empty = matches.is_empty();
     matches.sort_by(|a, b| a.correlation.total_cmp(&b.correlation));
     for Match { centre, flow, .. } in matches {
         let sites = |centre: f32, count: usize| {
@@ -61,16 +59,17 @@ pub(super) fn block_matches<T: SimdReal>(
             }
         }
     }
-    Ok(found)
+    !is_empty
 }
 
 fn picture<T: SimdReal>(simd: Level, view: &View<'_, T>) -> Frame<f32> {
     let (width, height) = view.spline.size();
     let xs: Vec<T> = (0..width).map(|x| T::from_f64(x as f64)).collect();
-    let mut out = vec![T::from_f64(0.0); width];
+    let (mut ys, mut out) = (vec![T::from_f64(0.0); width], vec![T::from_f64(0.0); width]);
     let mut picture = Frame::filled(width, height, 0.0);
     for y in 0..height {
-        view.spline.sample_row(simd, &xs, &vec![T::from_f64(y as f64); width], &mut out);
+        ys.fill(T::from_f64(y as f64));
+        view.spline.sample_row(simd, &xs, &ys, &mut out);
         picture.row_mut(y).iter_mut().zip(&out).for_each(|(to, from)| *to = from.to_f64() as f32);
     }
     picture

@@ -3,6 +3,7 @@
 use super::DescentPlan;
 use super::block_matches::block_matches;
 use super::comparison::Comparison;
+use crate::ablation::keeps;
 use crate::flow::coarse_to_fine::brightness_scale::MIN_RESIDUAL_SHARE;
 use crate::flow::coarse_to_fine::data_term::{DataTerm, MOTION, Pool};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
@@ -94,7 +95,7 @@ impl<T: SimdReal> Iteration<'_, T> {
         space.keep(trial);
     }
 
-    /// Takes over matches of blocks where they are better.
+    /// Takes over matches of blocks where they leave less residual energy.
     pub fn try_block_matches(
         &mut self,
         level: &PyramidLevel<T>,
@@ -102,20 +103,17 @@ impl<T: SimdReal> Iteration<'_, T> {
         (motion, old): (&mut Planes<T>, &mut Planes<T>),
         (pool, space): (&Pool<T>, &PlanePool<T>),
     ) {
-        let DescentPlan { simd, .. } = *self.plan;
-        let views = level.views(self.compared);
-        let matches = match block_matches(simd, &views, motion, copy(space, motion)) {
-            Ok(matches) => {
-                let (compared, residual_std) = (self.compared, self.residual_std);
-                let comparison =
-                    Comparison { simd, level, compared, residual_std, follows_majority: false, pool, space };
-                if comparison.replace_where_better(motion, &matches, MIN_MOTION_DIFFERENCE) {
-                    self.repeat(MATCH_ITERATIONS, level, smoothness, (motion, old));
-                }
-                matches
-            }
-            Err(unused) => unused,
-        };
+        if !keeps("flow.block_matches") {
+            return;
+        }
+        let (simd, compared, residual_std) = (self.plan.simd, self.compared, self.residual_std);
+        let mut matches = copy(space, motion);
+        let comparison = Comparison { simd, level, compared, residual_std, follows_majority: false, pool, space };
+        if block_matches(simd, &level.views(compared), motion, &mut matches)
+            && comparison.replace_where_better(motion, &matches, MIN_MOTION_DIFFERENCE)
+        {
+            self.repeat(MATCH_ITERATIONS, level, smoothness, (motion, old));
+        }
         space.keep(matches);
     }
 

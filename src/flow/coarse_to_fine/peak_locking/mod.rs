@@ -14,6 +14,7 @@
 use super::data_term::{DataOptions, View};
 use super::planes::{LEFT, Planes};
 use super::pyramid::{ComparedFrames, PyramidLevel};
+use crate::ablation::keeps;
 use crate::math::{median, robust_std};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
@@ -109,6 +110,7 @@ fn regress(sums: &[Sums]) -> (f64, f64) {
             return (0.0, 0.0);
         };
         let inverse = 1.0 / (HALF_WEIGHT_SCATTER * scale).max(f64::MIN_POSITIVE);
+        let inverse = if keeps("flow.robust_peak_locking") { inverse } else { 0.0 };
         let robust: Vec<f64> = known.iter().map(|s| 1.0 / (1.0 + (scatter(s) * inverse).powi(2))).collect();
         let weighted = || known.iter().zip(&robust);
         let (product, weight) =

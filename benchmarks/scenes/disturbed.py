@@ -1,0 +1,92 @@
+"""What real recordings bring, on textures with exact flow: frames that are not equally bright, saturated pixels,
+motions of a quarter of the frame."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+Array = NDArray[np.floating]
+SIZE = (200, 260)
+"""Height and width of the frames that are not equally bright."""
+MARGIN = 24
+"""Of the texture around the frame, px; also left out along each side of the field."""
+LARGE = (480, 640)
+"""Height and width of the frames with saturated pixels."""
+_X = np.linspace(0, 1, SIZE[1])
+CHANGES: dict[str, Callable[[Array], Array]] = {
+    "gain .5": lambda frame: 0.5 * frame,
+    "gain .8": lambda frame: 0.8 * frame,
+    "gain 1.4": lambda frame: 1.4 * frame,
+    "offset 60": lambda frame: frame + 60,
+    "offset -50": lambda frame: frame - 50,
+    "gain .8, offset 20": lambda frame: 0.8 * frame + 20,
+    "gain .7 to 1.1 along x": lambda frame: (0.7 + 0.4 * _X) * frame,
+}
+"""Of the second frame; none leaves the range of 8 bits."""
+
+
+def texture(seed: int, shape: tuple[int, int] = SIZE) -> Array:
+    """Fine and coarse grain, mean 0 and standard deviation 1, with a margin."""
+    rng = np.random.default_rng(seed)
+    noise = [rng.standard_normal([side + 2 * MARGIN for side in shape]) for _ in range(2)]
+    grain = [gaussian_filter(part, size) for part, size in zip(noise, (1.5, 6.0), strict=True)]
+    both: Array = grain[0] / grain[0].std() + grain[1] / grain[1].std()
+    return both / both.std()
+
+
+def view(picture: Array, shift: tuple[float, float], shape: tuple[int, int] = SIZE) -> Array:
+    """The frame in which the picture has moved by `shift` px, (x, y)."""
+    y, x = np.indices(shape).astype(float)
+    moved: Array = map_coordinates(
+        picture, [y + MARGIN - shift[1], x + MARGIN - shift[0]], order=5, mode="nearest"
+    )
+    return moved
+
+
+def noisy(frame: Array, seed: int, change: Callable[[Array], Array] = lambda frame: frame) -> Array:
+    """8-bit levels with noise of one level before a change of brightness."""
+    noise = np.random.default_rng(seed).standard_normal(frame.shape)
+    return np.clip(np.rint(change(frame + noise)), 0, 255)
+
+
+def changed_pair(seed: int, shift: tuple[float, float], change: str | None = None) -> list[Array]:
+    """Two frames, the second one changed."""
+    picture = 110 + 22 * texture(seed)
+    second = (CHANGES[change],) if change else ()
+    return [noisy(view(picture, (0, 0)), 1), noisy(view(picture, shift), 2, *second)]
+
+
+def inner(plane: Array) -> Array:
+    """Without the margin."""
+    return plane[MARGIN:-MARGIN, MARGIN:-MARGIN]
+
+
+def specks(seed: int) -> tuple[list[NDArray[np.uint16]], list[NDArray[np.uint16]], NDArray[np.bool_]]:
+    """Three 12-bit frames that move by .25 px, the same with 20 saturated pixels in the middle one, and what is
+    farther than 20 px from these."""
+    picture, rng = 1500 + 300 * texture(20 + seed, LARGE), np.random.default_rng(seed)
+    views = [view(picture, (0.25 * t, 0), LARGE) for t in (-1, 0, 1)]
+    clean = [np.rint(frame + 3 * rng.standard_normal(LARGE)).astype(np.uint16) for frame in views]
+    rows, columns = rng.integers(20, LARGE[0] - 20, 20), rng.integers(20, LARGE[1] - 20, 20)
+    middle = clean[1].copy()
+    middle[rows, columns] = 4095
+    y, x = np.indices(LARGE)
+    distance = np.min([np.hypot(x - c, y - r) for r, c in zip(rows, columns, strict=True)], axis=0)
+    return clean, [clean[0], middle, clean[2]], distance > 20
+
+
+FOUND = np.s_[130:-150, 130:-150]
+"""Of the speckle, what stays in the frame, off the parts that leave it."""
+
+
+def shifted_speckle(seed: int, shift: tuple[int, int]) -> list[Array]:
+    """Two frames of 400 x 400 px of fine speckle that moves by whole px, of up to 100; the coarsest levels of a
+    pyramid have nothing to follow."""
+    speckle = gaussian_filter(np.random.default_rng(seed).standard_normal((620, 620)), 1.5)
+    speckle = 128 + 40 * speckle / speckle.std()
+    u, v = shift
+    return [speckle[110:510, 110:510], speckle[110 - v : 510 - v, 110 - u : 510 - u]]
