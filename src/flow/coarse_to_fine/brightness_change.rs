@@ -38,7 +38,7 @@ const HALF_WEIGHT_RESIDUAL: f64 = 2.0;
 /// Bounds of the gain.
 const GAIN_BOUNDS: [f64; 2] = [0.1, 10.0];
 /// Minimum number of pixels, of a frame or of a measurement.
-const MIN_PIXELS: usize = 256;
+const MIN_PIXELS: usize = 128;
 
 /// Index of the frame that the others are brought to: the one the field belongs to.
 fn reference(frames: usize) -> usize {
