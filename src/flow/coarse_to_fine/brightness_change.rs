@@ -156,7 +156,7 @@ pub(super) fn equalize_along<T: SimdReal>(
         return None;
     }
     let map = |found: Option<LightMap>| {
-        found.map_or(LightMap::constant([1.0, 0.0]), |map| in_frames(map, scale * SITE_SPACING, brightness))
+        found.map_or(LightMap::constant([1.0, 0.0]), |map| in_frames(&map, scale * SITE_SPACING, brightness))
     };
     Some(equalize(frames, &found.into_iter().map(map).collect::<Vec<_>>()))
 }
@@ -236,7 +236,7 @@ fn improve(map: &mut LightMap, width: usize, (known, other): (&[f64], &[f64]), s
 }
 
 /// A map on sites, of brightness `(I - mean) gain`, in units of the frames; `site`: distance of sites, px.
-fn in_frames(map: LightMap, site: f64, brightness: BrightnessScale) -> LightMap {
+fn in_frames(map: &LightMap, site: f64, brightness: BrightnessScale) -> LightMap {
     let node = |&[gain, offset]: &[f64; 2]| [gain, brightness.mean * (1.0 - gain) + offset / brightness.gain];
-    LightMap { pitch: site * map.pitch, nodes: map.nodes.iter().map(node).collect(), ..map }
+    LightMap { pitch: site * map.pitch, nodes: map.nodes.iter().map(node).collect(), ..*map }
 }
