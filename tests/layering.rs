@@ -276,6 +276,22 @@ fn imports_go_one_way() {
 }
 
 #[test]
+fn systems_name_every_folder_of_tests() {
+    let tests = root().join("tests");
+    let systems = fs::read_to_string(tests.join("systems.rs")).unwrap();
+    let missing: Vec<String> = files(&tests, "rs")
+        .iter()
+        .filter_map(|file| file.strip_prefix(&tests).unwrap().parent()?.to_str().map(String::from))
+        .filter(|folder| !folder.is_empty() && !folder.contains('/') && folder != "source")
+        .filter(|folder| !systems.contains(&format!("\nmod {folder};\n")))
+        .collect();
+    assert!(
+        missing.is_empty(),
+        "tests/systems.rs: expected every folder beside it as a module, got none for {missing:?}"
+    );
+}
+
+#[test]
 fn files_of_a_room_form_no_circles() {
     let modules = Modules::read();
     let edges = modules.edges();

@@ -3,6 +3,7 @@
 use super::model::input::{Noise, Placement};
 use super::model::observations::Observations;
 use super::model::whitening::Whitening;
+use crate::{math, motion3d};
 
 #[allow(dead_code)]
 #[path = "../../tests/motion3d/scenes.rs"]

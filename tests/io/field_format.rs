@@ -1,6 +1,6 @@
 //! The formats a flow field can be written in: one variant and one arm each.
 
-use crate::fields::numbered;
+use super::fields::numbered;
 use jacoflow::io::{FieldFormat, read_flo, read_kitti, read_npz, read_pfm};
 use jacoflow::types::SamplingGrid;
 

@@ -1,6 +1,6 @@
 //! A flow field as `.npz`: every plane, and what it means as JSON.
 
-use crate::fields::numbered;
+use super::fields::numbered;
 use jacoflow::error::Error;
 use jacoflow::io::npz::{NpzReader, NpzWriter};
 use jacoflow::io::{read_npz_from, write_npz_to};

@@ -1,6 +1,6 @@
 //! Tables as CSV, written row by row.
 
-use crate::fields::numbered;
+use super::fields::numbered;
 use jacoflow::io::{FieldTable, TableWriter, cell};
 use jacoflow::types::{SamplingGrid, Status};
 

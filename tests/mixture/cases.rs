@@ -1,7 +1,7 @@
 //! Points of the tests of Dirichlet-process mixtures.
 
-use crate::math::random::CounterRng;
-use crate::mixture::{CovariancePrior, DirichletOptions};
+use super::math::random::CounterRng;
+use super::mixture::{CovariancePrior, DirichletOptions};
 
 /// Case D1 of twenty points in the plane, without random numbers: points, weights, responsibilities (20, 3).
 pub(crate) fn case_d1() -> (Vec<f64>, Vec<f64>, Vec<f64>) {

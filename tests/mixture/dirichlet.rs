@@ -1,6 +1,6 @@
 //! Exact cases, invariances and extremes.
 
-use crate::cases::{assert_near, case_d1, clusters, options};
+use super::cases::{assert_near, case_d1, clusters, options};
 use jacoflow::math::random::CounterRng;
 use jacoflow::mixture::{
     CovariancePrior, DirichletMixture, DirichletOptions, Inference, Points, fit_dirichlet, fit_dirichlet_from,

@@ -1,8 +1,8 @@
 //! Windows of fields whose flow is known.
 
-use crate::empty_field;
-use crate::math::random::CounterRng;
-use crate::motion3d::{
+use super::empty_field;
+use super::math::random::CounterRng;
+use super::motion3d::{
     Intrinsics, Motion, MotionEstimate, MotionOptions, Placement, Status as MotionStatus, estimate_patch_motion,
     field_patches,
 };

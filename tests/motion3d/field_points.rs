@@ -1,7 +1,7 @@
 //! Points of fields whose flow is known.
 
-use crate::empty_field;
-use crate::motion3d::{FieldOptions, field_points};
+use super::empty_field;
+use super::motion3d::{FieldOptions, field_points};
 use jacoflow::types::{FlowField, Rect, Status};
 
 fn field() -> FlowField<f32> {

@@ -1,6 +1,6 @@
 //! Flow, displacement and matrices of a known motion.
 
-use crate::{Motion, oblique};
+use super::{Motion, oblique};
 use nalgebra::{Matrix3, Vector3};
 
 fn near(got: &[f64], want: &[f64], tolerance: f64) {

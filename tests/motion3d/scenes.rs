@@ -1,7 +1,7 @@
 //! Random scenes with exact truth, and how estimates lie to it.
 
-use crate::math::random::CounterRng;
-use crate::motion3d::{Flow, Motion, MotionEstimate, MotionOptions, Noise, Placement, estimate_motion};
+use super::math::random::CounterRng;
+use super::motion3d::{Flow, Motion, MotionEstimate, MotionOptions, Noise, Placement, estimate_motion};
 use nalgebra::{SMatrix, Vector3};
 
 /// Rotation rate of the published scenes.

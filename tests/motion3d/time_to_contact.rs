@@ -1,8 +1,8 @@
 //! Times to contact of fields and points whose depths are known.
 
-use crate::motion3d::{CommonEffect, Intrinsics, UncertainMotion, contact_map};
-use crate::scenes::{Scene, smooth};
-use crate::{Motion, MotionOptions, Noise, Placement, empty_field, estimate_motion};
+use super::motion3d::{CommonEffect, Intrinsics, UncertainMotion, contact_map};
+use super::scenes::{Scene, smooth};
+use super::{Motion, MotionOptions, Noise, Placement, empty_field, estimate_motion};
 use jacoflow::types::{FlowField, Status};
 
 /// The same depth everywhere, seen by a camera of 100 px, with standard deviations of 0.05 px.

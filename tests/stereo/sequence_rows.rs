@@ -1,6 +1,6 @@
 //! The row offset of a sequence.
 
-use crate::row_offset::views;
+use super::row_offset::views;
 use jacoflow::math::random::CounterRng;
 use jacoflow::stereo::{EdgeDisparity, EdgeDisparityOptions, SequenceRows, edge_disparity};
 use jacoflow::types::Frame;

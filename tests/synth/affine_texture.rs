@@ -1,6 +1,6 @@
 //! Band-limited noise under a steady affine motion: the scene on which affine estimators are measured.
 
-use crate::scene_conformance as conformance;
+use super::scene_conformance as conformance;
 use jacoflow::parallel::Threads;
 use jacoflow::synth::{AffineTexture, Scene, truth};
 

@@ -1,6 +1,6 @@
 //! A turning disc on a ground at rest.
 
-use crate::scene_conformance as conformance;
+use super::scene_conformance as conformance;
 use jacoflow::synth::texture::Noise;
 use jacoflow::synth::{RotatingDisc, Scene, radians_per_frame};
 use jacoflow::types::AffineFlow;

@@ -1,6 +1,6 @@
 //! A steady affine velocity field.
 
-use crate::motion_conformance as conformance;
+use super::motion_conformance as conformance;
 use jacoflow::synth::motion::{AffineField, Motion};
 
 #[test]

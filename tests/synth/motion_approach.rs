@@ -1,6 +1,6 @@
 //! What a camera sees of a surface that it runs into.
 
-use crate::motion_conformance as conformance;
+use super::motion_conformance as conformance;
 use jacoflow::synth::motion::{Approach, Motion};
 
 #[test]

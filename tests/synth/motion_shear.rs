@@ -1,6 +1,6 @@
 //! Layers sliding over each other.
 
-use crate::motion_conformance as conformance;
+use super::motion_conformance as conformance;
 use jacoflow::synth::motion::SinusoidalShear;
 
 #[test]

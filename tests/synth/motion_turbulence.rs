@@ -1,6 +1,6 @@
 //! A random velocity field without divergence.
 
-use crate::motion_conformance as conformance;
+use super::motion_conformance as conformance;
 use jacoflow::synth::motion::{Motion, Turbulence};
 
 #[test]

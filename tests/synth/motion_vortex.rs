@@ -1,6 +1,6 @@
 //! A viscous vortex.
 
-use crate::motion_conformance as conformance;
+use super::motion_conformance as conformance;
 use jacoflow::synth::motion::{LambOseen, Motion};
 use std::f64::consts::TAU;
 

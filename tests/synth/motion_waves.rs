@@ -1,6 +1,6 @@
 //! A smooth random velocity field of one scale.
 
-use crate::motion_conformance as conformance;
+use super::motion_conformance as conformance;
 use jacoflow::synth::motion::{Motion, Waves};
 use std::f64::consts::TAU;
 

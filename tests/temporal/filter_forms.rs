@@ -1,4 +1,4 @@
-//! How the forms of the flow filter differ, on the patent's ramp. `cargo test --test temporal filter_forms --
+//! How the forms of the flow filter differ, on the patent's ramp. `cargo test --test systems filter_forms --
 //! --nocapture` prints the figures.
 
 use jacoflow::image::{GaussianSmoother, Quantiser};

@@ -1,8 +1,9 @@
 //! Exact cases, invariances and extremes.
 
 use super::*;
-use crate::mixture::points::Points;
+use crate::{math, mixture};
 use cases::{assert_near, case_d1, clusters, options};
+use mixture::points::Points;
 
 #[path = "../../../tests/mixture/cases.rs"]
 mod cases;

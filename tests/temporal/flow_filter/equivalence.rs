@@ -11,7 +11,7 @@ fn oracle(
     side: usize,
     motion_first: bool,
 ) -> Vec<(Vec<f64>, Vec<f64>)> {
-    use crate::dynamics::rk4;
+    use crate::temporal::dynamics::rk4;
     use jacoflow::filter::{SigmaPoints, UnscentedFilter};
     let options = FlowFilterOptions::patent();
     // Place of state component k in the oracle's order.
@@ -149,7 +149,7 @@ fn any_neighbourhood_updates_as_its_pixels_would() {
         (0..144).map(|k| if k % 13 == 0 { FlowFilterOptions::patent().process_noise[k / 13] } else { 0.0 }).collect();
     ukf.predict(|q, out| {
         for (q, out) in q.chunks_exact(12).zip(out.chunks_exact_mut(12)) {
-            out.copy_from_slice(&crate::dynamics::rk4(&q.try_into().unwrap(), &[0.0; 12]));
+            out.copy_from_slice(&crate::temporal::dynamics::rk4(&q.try_into().unwrap(), &[0.0; 12]));
         }
         Ok(())
     })

@@ -1,9 +1,6 @@
 //! The coarse-to-fine estimate on scenes with exact truth: large motions, pairs and triples, an edge between
 //! motions, holes, and its conventions.
 
-// Printed on purpose: the figures reached are part of the answer.
-#![allow(clippy::print_stdout)]
-
 use jacoflow::flow::coarse_to_fine::{CoarseToFineOptions, Preset};
 use jacoflow::flow::{Estimator, EstimatorOptions, InitialFlow, Method};
 use jacoflow::parallel::Threads;

@@ -1,9 +1,6 @@
 //! Frames in and results out: the recorded sequences with truth, where they are there, and files handed from
 //! one room to another.
 
-// Printed on purpose: a skipped recording is said.
-#![allow(clippy::print_stdout)]
-
 mod disparity;
 mod field_format;
 mod field_npz;

@@ -1,9 +1,6 @@
 //! The instantaneous estimator on the reference scene of WO2010/098160 (embodiment 2) and at the edges of its
 //! domain; derived quantities, points moved by a field, observability.
 
-// Printed on purpose: the figures reached are part of the answer.
-#![allow(clippy::print_stdout)]
-
 use jacoflow::flow::instantaneous::InstantaneousOptions;
 use jacoflow::flow::model::ModelKind;
 use jacoflow::flow::{Estimator, EstimatorOptions, Method, RankPolicy};

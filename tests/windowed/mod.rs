@@ -1,8 +1,5 @@
 //! The windowed estimate against a naive sum over each window, against exact scenes, and its conventions.
 
-// Printed on purpose: the figures reached are part of the answer.
-#![allow(clippy::print_stdout)]
-
 use jacoflow::flow::windowed::{RowSet, WindowedOptions};
 use jacoflow::flow::{Estimator, EstimatorOptions, Method, RankPolicy};
 use jacoflow::image::GaussianSmoother;

@@ -1,8 +1,5 @@
 //! The binary, end to end: real processes, real files, exit codes.
 
-// Printed on purpose: a skipped recording is said.
-#![allow(clippy::print_stdout)]
-
 mod support;
 
 mod commands;

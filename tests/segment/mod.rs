@@ -1,3 +1,3 @@
 //! Graph segmentation of images.
 
-mod segment;
+mod graph;
