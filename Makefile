@@ -8,11 +8,19 @@ CI := --profile ci
 # Rust's tests also look for overflow and failed assertions.
 CHECKED := --config profile.ci.package.jacoflow.overflow-checks=true --config profile.ci.package.jacoflow.debug-assertions=true
 
-.PHONY: test demo format clippy features rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare readme ablation clean
+.PHONY: test of-rust of-python demo format clippy features rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare readme ablation clean
 
-test: format clippy features rustdoc rust-test guide pytest
-	@$(MAKE) --no-print-directory -j2 -o install stubtest typing examples
+# The wheel first, which is most of what Python waits for. Then cargo's steps, which often use one core, beside
+# Python's; each step prints when it ends.
+test: format install
+	@$(MAKE) --no-print-directory -j2 -Otarget -o install of-rust of-python
 	@echo "everything passed"
+
+of-rust:
+	@for step in clippy features rustdoc rust-test guide; do $(MAKE) --no-print-directory $$step || exit 1; done
+
+of-python:
+	@for step in pytest stubtest typing examples; do $(MAKE) --no-print-directory -o install $$step || exit 1; done
 
 # The main job on an embedded example.
 demo:
@@ -26,10 +34,11 @@ clippy:
 	cargo clippy -q $(CI) --all-targets --features python,reference -- -D warnings
 	cargo clippy -q $(CI) --lib --bins -- -D warnings
 
-# Rooms on their own.
+# Rooms on their own. Those of one level do not import each other (`tests/layering.rs`): such that need the
+# same crates and lower rooms share a run.
 features:
-	@for room in filter mixture motion3d flow segment stereo io temporal track synth; do \
-		cargo check -q $(CI) --no-default-features --features $$room || exit 1; done
+	@for rooms in filter,mixture motion3d,segment,stereo synth flow io temporal track; do \
+		cargo check -q $(CI) --no-default-features --features $$rooms || exit 1; done
 
 rustdoc:
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q $(CI) --no-deps
@@ -59,7 +68,7 @@ install: wheel
 
 # One process for each core; files stay whole, so that what a file's tests share is made once.
 pytest: install
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 stubtest: install
 	cd $(VENV) && bin/python -m mypy.stubtest --allowlist $(CURDIR)/tests/stubtest_allowlist.txt jacoflow
