@@ -10,16 +10,17 @@ CHECKED := --config profile.ci.package.jacoflow.overflow-checks=true --config pr
 
 .PHONY: test of-rust of-python demo format clippy features rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare readme ablation clean
 
-# The wheel first, which is most of what Python waits for. Then cargo's steps, which often use one core, beside
-# Python's; each step prints when it ends.
-test: format install
-	@$(MAKE) --no-print-directory -j2 -Otarget -o install of-rust of-python
+# The wheel first, for which Python waits. Then cargo's steps, many of which use one core, beside Python's; each
+# prints when it ends.
+test: format wheel
+	@$(MAKE) --no-print-directory -j2 -Otarget of-rust of-python
 	@echo "everything passed"
 
 of-rust:
 	@for step in clippy features rustdoc rust-test guide; do $(MAKE) --no-print-directory $$step || exit 1; done
 
 of-python:
+	@$(MAKE) --no-print-directory -o wheel install
 	@for step in pytest stubtest typing examples; do $(MAKE) --no-print-directory -o install $$step || exit 1; done
 
 # The main job on an embedded example.
@@ -64,7 +65,7 @@ wheel: $(BIN)/maturin
 # The wheel, with what the tests need beside it.
 install: wheel
 	$(BIN)/python -m pip install -q --force-reinstall --no-deps $(WHEELS)/jacoflow-*.whl
-	$(BIN)/python -m pip install -q "jacoflow[test] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
+	$(BIN)/python -m pip install -q --no-compile "jacoflow[test] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
 
 # One process for each core; files stay whole, so that what a file's tests share is made once.
 pytest: install
