@@ -8,8 +8,9 @@ use std::any::Any;
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Maximum size of the pool, bytes; beyond it the oldest buffers are freed.
-const MAX_BYTES: usize = 64 << 20;
+/// Maximum size of the pool, bytes; beyond it the oldest buffers are freed. A flow field of 1920 x 1080 px
+/// with its covariance and its frames takes 240 MB.
+const MAX_BYTES: usize = 256 << 20;
 /// Minimum size of a pooled buffer, bytes: the allocator is quick with smaller ones.
 const MIN_BUFFER_BYTES: usize = 64 << 10;
 

@@ -31,27 +31,9 @@ pub(super) struct Estimate<T> {
 }
 
 impl<T: SimdReal> Estimate<T> {
-    pub fn planes_mut(&mut self) -> impl Iterator<Item = &mut Planes<T>> {
-        let statistics =
-            self.statistics.iter_mut().chain(&mut self.acceleration).flat_map(WindowStatistics::planes_mut);
-        statistics.chain(&mut self.coarser_motions).chain([&mut self.motion, &mut self.data])
-    }
-
-    /// Returns the planes that only covariance and diagnostics need.
-    pub fn release_statistics(&mut self, workspace: &Workspace<T>) {
-        let statistics = self.statistics.take().into_iter().chain(self.acceleration.take());
-        let coarser_motions = std::mem::take(&mut self.coarser_motions);
-        statistics
-            .flat_map(WindowStatistics::into_planes)
-            .chain(coarser_motions)
-            .for_each(|planes| workspace.space.keep(planes));
-    }
-
     /// Returns all planes.
-    pub fn recycle(mut self, workspace: &Workspace<T>) {
-        self.release_statistics(workspace);
-        for planes in [self.motion, self.data] {
-            workspace.space.keep(planes);
-        }
+    pub fn recycle(self, workspace: &Workspace<T>) {
+        let statistics = self.statistics.into_iter().chain(self.acceleration).flat_map(WindowStatistics::into_planes);
+        statistics.chain(self.coarser_motions).chain([self.motion, self.data]).for_each(|p| workspace.space.keep(p));
     }
 }

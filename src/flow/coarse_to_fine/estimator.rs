@@ -3,7 +3,6 @@
 use super::acceleration::to_middle_frame;
 use super::brightness_change::{equalize_along, equalize_roughly};
 use super::brightness_scale::BrightnessScale;
-use super::covariance::CovarianceMaps;
 use super::descent::{DescentPlan, DescentResult};
 use super::estimate::Estimate;
 use super::options::CoarseToFineOptions;
@@ -61,7 +60,7 @@ impl CoarseToFine {
             let found = plan.estimate_fine_levels(&mut workspace, coarse, iterations);
             let mut estimate = estimate(&plan, found, (frames.len() == 3, self.options.central), &mut workspace);
             estimate.noise_gain = noise_gain;
-            let covariance_of = covariance_of(&mut estimate, &mut workspace, (frames, common), field);
+            let covariance_of = field.covariance.is_some().then(|| output::covariance_of(&estimate, frames, common));
             output::fill((&estimate, covariance_of), &workspace.space, frames, common, field);
             estimate.recycle(&workspace);
             self.store.put_back(workspace);
@@ -105,29 +104,6 @@ impl CoarseToFine {
     }
 }
 
-/// The covariance, if requested. It needs so many planes that other memory is returned first.
-fn covariance_of<T: SimdReal>(
-    estimate: &mut Estimate<T>,
-    workspace: &mut Workspace<T>,
-    (frames, common): (&[&Frame<T>], &EstimatorOptions),
-    field: &FlowField<T>,
-) -> Option<CovarianceMaps<T>> {
-    if field.covariance.is_none() {
-        workspace.clear_if_large();
-        return None;
-    }
-    let is_large = workspace.is_large();
-    if is_large {
-        workspace.release_to_system(estimate.planes_mut());
-    }
-    let covariance_of = output::covariance_of(estimate, frames, common);
-    if is_large && field.window.is_none() {
-        estimate.release_statistics(workspace);
-        workspace.release_to_system(estimate.planes_mut());
-    }
-    Some(covariance_of)
-}
-
 fn estimate<T: SimdReal>(
     plan: &DescentPlan,
     mut found: DescentResult<T>,
@@ -141,8 +117,6 @@ fn estimate<T: SimdReal>(
         // Linearised about the refined motion, the residual is noise; about the regularised motion it also
         // contains what the windows of the data term smooth away.
         statistics.into_iter().flat_map(WindowStatistics::into_planes).for_each(|planes| workspace.space.keep(planes));
-        // The data term and the refinement together would be the peak of memory.
-        workspace.release_to_system_if_large();
         let mut better = plan.relinearise(workspace, &motion);
         better.coarser_motions = found.coarser_motions;
         for planes in [motion, found.motion, found.data] {

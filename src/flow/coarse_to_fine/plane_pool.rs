@@ -4,9 +4,6 @@ use super::planes::Planes;
 use crate::simd::SimdReal;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Maximum size, bytes, of a workspace that is kept after its estimator: that of a frame of 800,000 px.
-pub(super) const MAX_KEPT_BYTES: usize = 64 << 20;
-
 #[derive(Debug, Default)]
 pub(super) struct PlanePool<T> {
     free: Mutex<Vec<Planes<T>>>,
@@ -29,17 +26,6 @@ impl<T: SimdReal> PlanePool<T> {
         if planes.room() > 0 {
             lock(&self.free).push(planes);
         }
-    }
-
-    /// Returns planes, but frees those of large frames: later stages need the memory.
-    pub fn keep_small(&self, planes: Planes<T>) {
-        if planes.room() * size_of::<T>() <= MAX_KEPT_BYTES / 4 {
-            self.keep(planes);
-        }
-    }
-
-    pub fn clear(&self) {
-        lock(&self.free).clear();
     }
 
     /// Free samples.

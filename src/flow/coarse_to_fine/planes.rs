@@ -40,9 +40,9 @@ impl<T: SimdReal> Planes<T> {
         }
     }
 
-    pub fn shrink(&mut self) {
-        self.data.truncate(self.row_len() * self.height);
-        self.data.shrink_to_fit();
+    pub fn copy_from(&mut self, other: &Self) {
+        self.reshape(other.width, other.height, other.count);
+        self.data_mut().copy_from_slice(other.data());
     }
 
     /// Capacity, samples.

@@ -108,10 +108,6 @@ impl<T: SimdReal> Pyramid<T> {
                 }
             }
         }
-        // The largest picture is a whole plane and no longer needed.
-        if let Some(finest) = self.levels.first_mut() {
-            finest.picture = Frame::default();
-        }
         finest
     }
 }

@@ -1,8 +1,7 @@
 //! Memory that one estimate leaves for the next.
 
 use super::data_term::Pool;
-use super::plane_pool::{MAX_KEPT_BYTES, PlanePool, lock};
-use super::planes::Planes;
+use super::plane_pool::{PlanePool, lock};
 use super::pyramid::Pyramid;
 use super::regularize::RegularizeScratch;
 use crate::parallel::PerProcess;
@@ -19,49 +18,13 @@ pub(super) struct Workspace<T> {
 }
 
 impl<T: SimdReal> Workspace<T> {
-    /// Whether there is so much memory that results should not need theirs in addition.
-    pub fn is_large(&self) -> bool {
-        self.bytes() > MAX_KEPT_BYTES
-    }
-
-    pub fn clear_if_large(&self) {
-        if self.is_large() {
-            self.clear();
-        }
-    }
-
-    pub fn clear(&self) {
-        self.space.clear();
-    }
-
-    /// Returns unused planes of a large workspace to the system: later blocks have other sizes.
-    pub fn release_to_system_if_large(&self) {
-        if self.is_large() {
-            self.clear();
-            release_to_system();
-        }
-    }
-
-    /// Returns everything but the `needed` planes to the system; the next estimate allocates anew.
-    pub fn release_to_system<'a>(&mut self, needed: impl Iterator<Item = &'a mut Planes<T>>) {
-        *self = Self::default();
-        needed.for_each(Planes::shrink);
-        release_to_system();
-    }
-
     fn bytes(&self) -> usize {
         (self.pyramid.samples() + self.space.room()) * size_of::<T>()
     }
 }
 
-/// Returns freed memory to the system: the GNU allocator keeps blocks of up to 32 MiB, most of ours.
-fn release_to_system() {
-    #[cfg(all(target_os = "linux", target_env = "gnu"))]
-    // SAFETY: takes no pointer, and may be called at any time from any thread.
-    unsafe {
-        libc::malloc_trim(0);
-    }
-}
+/// Maximum size, bytes, of a workspace that is kept after its estimator: that of frames of 1920 x 1080 px.
+const MAX_KEPT_BYTES: usize = 640 << 20;
 
 /// The workspace of the last estimator that was dropped.
 static LAST: PerProcess<Mutex<Option<Box<dyn Any + Send>>>> = PerProcess::new();

@@ -36,7 +36,6 @@ pub(super) fn to_middle_frame<T: SimdReal>(
     central: bool,
 ) -> Option<WindowStatistics<T>> {
     let (simd, finest) = (plan.simd, plan.finest);
-    workspace.release_to_system_if_large();
     let DescentResult { motion: mut next_step_motion, data, residual_std, .. } =
         plan.next_step(workspace, &regularized);
     let Workspace { pyramid, pool, space, .. } = &*workspace;
@@ -62,7 +61,6 @@ pub(super) fn to_middle_frame<T: SimdReal>(
     }
     let mut statistics = None;
     if !central {
-        workspace.release_to_system_if_large();
         let (change, chosen) = refine(simd, space, &RefineOptions::for_changes(), &rest, &data);
         add(motion, &change, 1.0);
         for planes in [change, rest] {
@@ -70,10 +68,8 @@ pub(super) fn to_middle_frame<T: SimdReal>(
         }
         statistics = chosen;
         // Three frames have twice the occlusions of two, and objects may stop, start or turn back.
-        workspace.release_to_system_if_large();
         let (own, chosen) = refine(simd, space, &RefineOptions::default(), &next_step_motion, &data);
         chosen.into_iter().flat_map(WindowStatistics::into_planes).for_each(|planes| space.keep(planes));
-        workspace.release_to_system_if_large();
         let level = &pyramid.levels()[finest];
         let (compared, follows_majority) = (ComparedFrames::Ahead, false);
         Comparison { simd, level, compared, residual_std, follows_majority, pool, space }
@@ -96,7 +92,7 @@ fn difference<T: SimdReal>(
     let mut out = space.planes(next_step_motion.width, next_step_motion.height, MOTION);
     out.data_mut().copy_from_slice(next_step_motion.data());
     add(&mut out, known, -1.0);
-    continue_beyond(data, &mut out);
+    continue_beyond(space, data, &mut out);
     out
 }
 
@@ -131,7 +127,7 @@ const MIN_WINDOW_SHARE: f64 = 0.95;
 
 /// Gives sites with incomplete windows the flow of the nearest complete ones in their row and column,
 /// weighted by nearness; in corners without any, that of the nearest in the nearest row.
-fn continue_beyond<T: SimdReal>(data: &Planes<T>, flow: &mut Planes<T>) {
+fn continue_beyond<T: SimdReal>(space: &PlanePool<T>, data: &Planes<T>, flow: &mut Planes<T>) {
     let (width, height) = (data.width, data.height);
     let is_complete = |x: usize, y: usize| data.at(SEEN, x, y).to_f64() >= MIN_WINDOW_SHARE;
     let rows: Vec<Vec<usize>> = (0..height).map(|y| (0..width).filter(|&x| is_complete(x, y)).collect()).collect();
@@ -140,7 +136,8 @@ fn continue_beyond<T: SimdReal>(data: &Planes<T>, flow: &mut Planes<T>) {
     if filled.is_empty() {
         return;
     }
-    let known = flow.clone();
+    let mut known = space.planes(width, height, MOTION);
+    known.copy_from(flow);
     for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).filter(|&(x, y)| !is_complete(x, y)) {
         let beside = (!rows[y].is_empty()).then(|| (nearest(&rows[y], x), y));
         let above = (!columns[x].is_empty()).then(|| (x, nearest(&columns[x], y)));
@@ -154,6 +151,7 @@ fn continue_beyond<T: SimdReal>(data: &Planes<T>, flow: &mut Planes<T>) {
         }
         (0..2).for_each(|k| flow.line_mut(k, y)[x] = T::from_f64(sum[k] / weights));
     }
+    space.keep(known);
 }
 
 fn nearest(numbers: &[usize], to: usize) -> usize {
@@ -165,8 +163,10 @@ fn nearest(numbers: &[usize], to: usize) -> usize {
 /// Share of the `steady` change in the `change`, 0 to 1: a slope, fitted with Cauchy's weights.
 fn share<T: SimdReal>(change: &Planes<T>, steady: &Planes<T>) -> f64 {
     let (mut share, mut typical) = (0.0, f64::INFINITY);
+    let mut rests = Vec::with_capacity(change.width * change.height);
     for _ in 0..REWEIGHTING_ROUNDS {
-        let (mut product, mut square, mut rests) = (0.0, 0.0, Vec::new());
+        let (mut product, mut square) = (0.0, 0.0);
+        rests.clear();
         for y in 0..change.height {
             let [u, v] = [0, 1].map(|k| (change.line(k, y), steady.line(k, y)));
             for x in 0..change.width {

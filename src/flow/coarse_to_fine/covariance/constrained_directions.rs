@@ -1,18 +1,17 @@
 //! Constrained directions: where the data determine the motion, and in which directions.
 
-use super::noise::{ALL, NONE, Noise, UnconstrainedDirections, mean_information};
-use crate::flow::coarse_to_fine::data_term::{MIN_USABLE_SHARE, SEEN};
+use super::noise::{ALL, NONE, Noise, UnconstrainedDirections};
+use crate::flow::coarse_to_fine::data_term::{MIN_USABLE_SHARE, SEEN, UU, UV, VV};
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;
+use crate::parallel::for_each_band;
 use crate::simd::SimdReal;
-use rayon::prelude::*;
 use std::f64::consts::SQRT_2;
 
 /// Minimum share of constrained sites from which the errors of coarse levels are measured.
 const MIN_CONSTRAINED_SHARE: f64 = 0.02;
 /// Reach, sites, of the mean of the information.
 const INFORMATION_REACH: usize = 1;
-const SITES_PER_TASK: usize = 4096;
 
 pub(super) struct ConstrainedDirections {
     width: usize,
@@ -28,18 +27,33 @@ pub(super) struct ConstrainedDirections {
 impl ConstrainedDirections {
     pub fn new<T: SimdReal>(data: &Planes<T>, noise: &Noise<'_, T>, nodes: (usize, usize)) -> Self {
         let (width, height) = (data.width, data.height);
-        let around_site =
+        let around =
             |at: usize, len: usize| at.saturating_sub(INFORMATION_REACH)..(at + INFORMATION_REACH + 1).min(len);
         let node = |site: usize, count: usize| {
             ((site + SITES_PER_NODE / 2) / SITES_PER_NODE).min(count.div_ceil(SITES_PER_NODE) - 1)
         };
-        let directions = |n: usize| {
-            let (x, y) = (n % width, n / width);
-            let information = mean_information(data, around_site(x, width), around_site(y, height));
-            noise.unconstrained(information, node(x, width), node(y, height))
+        // Sums along each row first: they serve three rows.
+        let sums_along = |k: usize, y: usize| -> Vec<f64> {
+            let line = data.line(k, y);
+            (0..width).map(|x| line[around(x, width)].iter().map(|value| value.to_f64()).sum()).collect()
         };
-        let sites: Vec<UnconstrainedDirections> =
-            (0..width * height).into_par_iter().with_min_len(SITES_PER_TASK).map(directions).collect();
+        let mut sites = vec![NONE; width * height];
+        for_each_band(&mut sites, width, |_, rows, out| {
+            let reached = around(rows.start, height).start..around(rows.end - 1, height).end;
+            let sums = [UU, UV, VV].map(|k| reached.clone().map(|y| sums_along(k, y)).collect::<Vec<_>>());
+            for (y, out) in rows.zip(out.chunks_exact_mut(width)) {
+                let rows = around(y, height);
+                for (x, out) in out.iter_mut().enumerate() {
+                    let count = (around(x, width).len() * rows.len()) as f64;
+                    let mean = |sums: &[Vec<f64>]| {
+                        let rows = rows.start - reached.start..rows.end - reached.start;
+                        sums[rows].iter().map(|sums| sums[x]).sum::<f64>() / count
+                    };
+                    let information = [mean(&sums[0]), mean(&sums[1]), mean(&sums[2])];
+                    *out = noise.unconstrained(information, node(x, width), node(y, height));
+                }
+            }
+        });
         let is_usable = |n: usize| data.at(SEEN, n % width, n / width).to_f64() >= MIN_USABLE_SHARE;
         Self::with((width, &sites), nodes, is_usable)
     }

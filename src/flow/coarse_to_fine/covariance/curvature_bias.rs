@@ -9,7 +9,7 @@
 //! measured with a Gaussian of [`FIXED_SIGMA`]. The chosen windows differ, so the motion loses `(1 - G)^4`,
 //! as it does in them, to Gaussians that are somewhat wider, with the weights of the windows.
 
-use super::{Entries, binomial_mean};
+use super::{Entries, NODES_PER_TASK, binomial_mean};
 use crate::flow::coarse_to_fine::data_term::MOTION;
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, TERMS, WindowStatistics};
@@ -26,7 +26,6 @@ const CHOSEN_SIGMA_FACTOR: f64 = 1.25;
 const MIN_CHOSEN_SIGMA: f64 = 3.5;
 /// Isotropic share of the slopes' squared errors: estimates of turbulence have divergence.
 const ISOTROPIC_SHARE: f64 = 0.2;
-const NODES_PER_TASK: usize = 1024;
 /// The motion or its loss at a node.
 type Loss = [f64; MOTION];
 
@@ -107,28 +106,28 @@ fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, statistics: &WindowStatistic
     let nodes: Vec<(usize, usize)> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
     let whole: Vec<Loss> = nodes.iter().map(|&at| motion_at(motion, at)).collect();
     let mut lost = vec![[0.0; MOTION]; whole.len()];
+    let (mut left, mut rows) = (lost.clone(), lost.clone());
     for (l, sigma) in statistics.sigmas.iter().enumerate().filter(|(_, s)| **s >= MIN_CHOSEN_SIGMA) {
         let weights: Vec<[f64; 2]> = nodes.iter().map(|&(x, y)| statistics.weights(l, x, y)).collect();
         if weights.iter().flatten().all(|w| *w < 0.01) {
             continue;
         }
-        let mut left = whole.clone();
+        left.copy_from_slice(&whole);
+        let sigma = CHOSEN_SIGMA_FACTOR * sigma / (SITE_SPACING * SITES_PER_NODE as f64);
+        let taps = (gaussians(sigma, (width, 1), width), gaussians(sigma, (height, 1), height));
         for _ in TERMS {
-            let smooth =
-                smoothed(&left, (width, height), CHOSEN_SIGMA_FACTOR * sigma / (SITE_SPACING * SITES_PER_NODE as f64));
-            for (left, smooth) in left.iter_mut().zip(smooth) {
-                (0..MOTION).for_each(|k| left[k] -= smooth[k]);
-            }
+            subtract_smooth(&mut left, &mut rows, &taps);
         }
-        for ((lost, weight), left) in lost.iter_mut().zip(weights).zip(left) {
+        for ((lost, weight), left) in lost.iter_mut().zip(weights).zip(&left) {
             (0..MOTION).for_each(|k| lost[k] += weight[usize::from(k >= 2)] * left[k]);
         }
     }
     lost
 }
 
-fn smoothed(values: &[Loss], (width, height): (usize, usize), sigma: f64) -> Vec<Loss> {
-    let (along, across) = (gaussians(sigma, (width, 1), width), gaussians(sigma, (height, 1), height));
+/// Subtracts the smoothed `values` from them; `rows` is scratch memory.
+fn subtract_smooth(values: &mut [Loss], rows: &mut [Loss], (along, across): &(Vec<Taps>, Vec<Taps>)) {
+    let width = along.len();
     let mean = |from: &[Loss], taps: &Taps, first: usize, step: usize| {
         let mut sum = [0.0; MOTION];
         for &(n, weight) in taps {
@@ -137,9 +136,12 @@ fn smoothed(values: &[Loss], (width, height): (usize, usize), sigma: f64) -> Vec
         }
         sum
     };
-    let nodes_in_parallel = || (0..values.len()).into_par_iter().with_min_len(NODES_PER_TASK);
-    let rows: Vec<Loss> = nodes_in_parallel().map(|n| mean(values, &along[n % width], n - n % width, 1)).collect();
-    nodes_in_parallel().map(|n| mean(&rows, &across[n / width], n % width, width)).collect()
+    let nodes = rows.par_iter_mut().enumerate().with_min_len(NODES_PER_TASK);
+    nodes.for_each(|(n, out)| *out = mean(values, &along[n % width], n - n % width, 1));
+    values.par_iter_mut().enumerate().with_min_len(NODES_PER_TASK).for_each(|(n, value)| {
+        let smooth = mean(rows, &across[n / width], n % width, width);
+        (0..MOTION).for_each(|k| value[k] -= smooth[k]);
+    });
 }
 
 /// Sites and their weights.

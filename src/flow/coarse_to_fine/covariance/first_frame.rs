@@ -3,12 +3,13 @@
 //! The motion `m` at `p + u / 2` becomes that of the pixel `p` by `u_1 = u(p + u_1 / 2)` and `M_1 = N M` with
 //! `N = (I - M / 2)^-1`. To first order errors become `N du` and `N dM N`.
 
-use super::Entries;
 use super::map::NodeAxis;
+use super::{Entries, NODES_PER_TASK};
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
+use rayon::prelude::*;
 
 type Square = [[f64; 6]; 6];
 
@@ -19,6 +20,8 @@ pub(super) fn to_first_frame<T: SimdReal>(
 ) -> Vec<Entries> {
     let last = (motion.width - 1, motion.height - 1);
     (0..nodes.len())
+        .into_par_iter()
+        .with_min_len(NODES_PER_TASK)
         .map(|n| {
             let (x, y) = (n % axes.0.count, n / axes.0.count);
             let m = super::curvature_bias::motion_at(motion, (x, y));
@@ -60,16 +63,18 @@ fn transformed(entries: &Entries, n: &[[f64; 2]; 2]) -> Entries {
         }
     }
     let at = |i: usize, j: usize| entries[upper(i.min(j), i.max(j))];
+    // Flow is mapped to flow, derivatives to derivatives.
+    let block = |i: usize| if i < 2 { 0..2 } else { 2..6 };
     let mut half: Square = [[0.0; 6]; 6];
     for i in 0..6 {
         for j in 0..6 {
-            half[i][j] = (0..6).map(|k| map[i][k] * at(k, j)).sum();
+            half[i][j] = block(i).map(|k| map[i][k] * at(k, j)).sum();
         }
     }
     let mut out = [0.0; ENTRIES];
     for i in 0..6 {
         for j in i..6 {
-            out[upper(i, j)] = (0..6).map(|k| half[i][k] * map[j][k]).sum();
+            out[upper(i, j)] = block(j).map(|k| half[i][k] * map[j][k]).sum();
         }
     }
     out

@@ -43,6 +43,8 @@ pub(in crate::flow::coarse_to_fine) struct CovarianceMap<T> {
     across: NodeAxis,
     /// Pixels from one node to the next.
     step: usize,
+    /// Numbers of those pixels.
+    ramp: Vec<T>,
 }
 
 impl<T: SimdReal> CovarianceMap<T> {
@@ -60,7 +62,8 @@ impl<T: SimdReal> CovarianceMap<T> {
                 line.iter_mut().zip(row).for_each(|(out, node)| *out = T::from_f64(scale[k] * node[k]));
             }
         }
-        Self { planes, along, across, step: NODE_SPACING << level }
+        let step = NODE_SPACING << level;
+        Self { planes, along, across, step, ramp: (0..step).map(|i| T::from_f64(i as f64)).collect() }
     }
 
     pub fn at(&self, k: usize, (x, y): (usize, usize)) -> T {
@@ -74,6 +77,7 @@ impl<T: SimdReal> CovarianceMap<T> {
     }
 
     /// Entry `k` along row `y`, to the end of `out`; `nodes` is scratch memory.
+    #[inline(always)]
     pub fn row(&self, k: usize, y: usize, nodes: &mut Vec<T>, out: &mut [T]) {
         let (above, below, share) = self.across.around(y as f64 / self.step as f64);
         let share = T::from_f64(share);
@@ -85,9 +89,18 @@ impl<T: SimdReal> CovarianceMap<T> {
             let (first, next) = (nodes[n.min(last)], nodes[(n + 1).min(last)]);
             let length = self.step as f64 * self.along.length(n);
             let rise = (next - first) * T::from_f64(if length > 0.0 { 1.0 / length } else { 0.0 });
+            if out.len() == self.step && length == self.step as f64 {
+                // Parts of known length, so that the compiler uses lanes.
+                for (out, ramp) in out.chunks_exact_mut(NODE_SPACING).zip(self.ramp.chunks_exact(NODE_SPACING)) {
+                    for i in 0..NODE_SPACING {
+                        out[i] = first + rise * ramp[i];
+                    }
+                }
+                continue;
+            }
             let (sloping, flat) = out.split_at_mut(out.len().min(length.ceil() as usize));
-            for (i, out) in sloping.iter_mut().enumerate() {
-                *out = first + rise * T::from_f64(i as f64);
+            for (out, i) in sloping.iter_mut().zip(&self.ramp) {
+                *out = first + rise * *i;
             }
             flat.fill(next);
         }

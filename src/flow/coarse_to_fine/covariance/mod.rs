@@ -66,6 +66,9 @@ const MIN_TEXTURED_SHARE: f64 = 0.02;
 /// Share of the noise variance that the next frames' estimates repeat: texture moves on slowly.
 const REPEATED_NOISE_SHARE: f64 = 0.3;
 
+/// Minimum nodes of a parallel task.
+const NODES_PER_TASK: usize = 1024;
+
 /// A covariance: its upper triangle, row by row.
 type Entries = [f64; ENTRIES];
 
@@ -103,8 +106,7 @@ pub(super) fn covariance<T: SimdReal>(
     });
     let kind = usize::from(!is_pair);
     let mut nodes = curvature_bias::curvature_bias(&estimate.motion, statistics, CURVATURE_SHARES[kind]);
-    let mut noises = vec![[0.0; ENTRIES]; if with_systematic { nodes.len() } else { 0 }];
-    for (n, node) in nodes.iter_mut().enumerate() {
+    let complete = |(n, node): (usize, &mut Entries)| {
         let at = (n % width, n / width);
         let motion = curvature_bias::motion_at(&estimate.motion, at);
         let mut noise_part = [0.0; ENTRIES];
@@ -123,9 +125,14 @@ pub(super) fn covariance<T: SimdReal>(
             add_acceleration(node, &motion);
         }
         node.iter_mut().zip(&noise_part).for_each(|(entry, noise)| *entry += noise);
-        if with_systematic {
-            noises[n] = noise_part;
-        }
+        noise_part
+    };
+    let completed = nodes.par_iter_mut().enumerate().with_min_len(NODES_PER_TASK).map(complete);
+    let mut noises: Vec<Entries> = Vec::new();
+    if with_systematic {
+        completed.collect_into_vec(&mut noises);
+    } else {
+        completed.for_each(drop);
     }
     let map = |nodes: Vec<Entries>| {
         let carried = if is_pair { first_frame::to_first_frame(&nodes, &estimate.motion, axes) } else { nodes };

@@ -107,6 +107,8 @@ pub(super) struct Noise<'a, T> {
     statistics: &'a WindowStatistics<T>,
     energy: Energy,
     excess: f64,
+    /// [`of_white_noise`] of the flow and of its slopes.
+    shares: [f64; 2],
     /// Information, in any direction, that white noise contributes, over its residual energy.
     white_information: f64,
     support: &'a DataSupport,
@@ -123,6 +125,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
             statistics,
             energy,
             excess: excess(statistics, data),
+            shares: [of_white_noise(1), of_white_noise(2)],
             white_information: if is_pair { PAIR_NOISE_INFORMATION } else { TRIPLE_NOISE_INFORMATION },
             support,
         }
@@ -155,8 +158,13 @@ impl<'a, T: SimdReal> Noise<'a, T> {
     /// Directions in which this mean information of the sites near a node does not constrain the motion.
     pub fn unconstrained(&self, [a, b, c]: [f64; 3], x: usize, y: usize) -> UnconstrainedDirections {
         let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
+        let energy = self.energy(x, y);
+        let beyond = |share: f64| (self.white_information + share) * energy;
+        // The usual case, without a root.
+        if middle - (half.abs() + b.abs()) >= beyond(MIN_CONSTRAINING_INFORMATION) {
+            return NONE;
+        }
         let radius = half.hypot(b);
-        let beyond = |share: f64| (self.white_information + share) * self.energy(x, y);
         if middle - radius >= beyond(MIN_CONSTRAINING_INFORMATION) {
             return NONE;
         }
@@ -175,7 +183,7 @@ impl<'a, T: SimdReal> Noise<'a, T> {
             self.white_information * energy,
         );
         let scale = self.excess * energy;
-        let (flow_share, slope_share) = (of_white_noise(1), of_white_noise(2));
+        let [flow_share, slope_share] = self.shares;
         let widest = self.statistics.sigmas.len() - 1;
         let windows = 0..=widest;
         let weights: Vec<[f64; 2]> = windows.map(|l| self.statistics.weights(l, x, y)).collect();

@@ -71,8 +71,9 @@ impl<T: SimdReal> Comparison<'_, T> {
             if usable >= MIN_USABLE_SHARE { error.to_f64() / usable } else { f64::NAN }
         };
         let rows = (0..data.height).flat_map(|y| data.line(ERROR, y).iter().zip(data.line(VALID, y)));
-        let residual_energies = rows.map(energy).collect();
-        self.space.keep_small(data);
+        let mut residual_energies = Vec::with_capacity(data.width * data.height);
+        residual_energies.extend(rows.map(energy));
+        self.space.keep(data);
         residual_energies
     }
 }

@@ -28,7 +28,8 @@ impl DescentPlan {
     ) -> (DescentResult<T>, usize) {
         let (all, levels) = (ComparedFrames::All, workspace.pyramid.levels());
         let first = self.coarse_level(workspace);
-        let mut start = workspace.space.planes(0, 0, MOTION);
+        let size = site_counts(levels[first].size);
+        let mut start = workspace.space.planes(size.0, size.1, MOTION);
         sample(given, first, levels[first].size, midway, &mut start);
         let mut schedules = self.schedules(levels);
         schedules.truncate(first + 1);

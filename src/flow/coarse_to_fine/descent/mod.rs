@@ -151,7 +151,8 @@ impl DescentPlan {
             self.without_levels().descend(workspace, ComparedFrames::Ahead, (start, None), (&schedules, level + 1));
         let Workspace { pyramid, pool, space, .. } = workspace;
         let level = &pyramid.levels()[level];
-        let mut own = space.planes(0, 0, MOTION);
+        let (width, height) = site_counts(level.size);
+        let mut own = space.planes(width, height, MOTION);
         finer(self.simd, &coarser_motions, level.size, &mut own);
         let (simd, compared, follows_majority) = (self.simd, ComparedFrames::Ahead, false);
         let comparison = Comparison { simd, level, compared, residual_std, follows_majority, pool, space };
@@ -167,7 +168,7 @@ impl DescentPlan {
         &self,
         workspace: &mut Workspace<T>,
         compared: ComparedFrames,
-        (mut motion, residual_std): (Planes<T>, Option<T>),
+        (start, residual_std): (Planes<T>, Option<T>),
         (schedules, to): (&[LevelSchedule], usize),
     ) -> DescentResult<T> {
         let Workspace { pyramid, pool, scratch, space } = workspace;
@@ -175,7 +176,10 @@ impl DescentPlan {
         let mut data = space.planes(width, height, COUNT);
         let term = DataTerm::new(self.simd, DataOptions::default(), pool);
         let mut step = Iteration { plan: self, compared, term, data: &mut data, scratch, residual_std };
-        let mut old = space.planes(0, 0, MOTION);
+        // With room for the finest level: both grow on the way.
+        let [mut motion, mut old] = [0, 1].map(|_| space.planes(width, height, MOTION));
+        motion.copy_from(&start);
+        space.keep(start);
         let mut coarser_motions = Vec::new();
         for (k, (level, schedule)) in pyramid.levels().iter().zip(schedules).enumerate().skip(to).rev() {
             if k + 1 < schedules.len() {
@@ -206,7 +210,7 @@ impl DescentPlan {
         space.keep(old);
         let residual_std = step.residual_std;
         let summary = summary(space, &data);
-        space.keep_small(data);
+        space.keep(data);
         DescentResult { motion, data: summary, residual_std, coarser_motions }
     }
 }
@@ -216,8 +220,9 @@ fn coarsened<T: SimdReal>(workspace: &Workspace<T>, motion: &Planes<T>, levels: 
     let space = &workspace.space;
     let mut out = copy(space, motion);
     for level in levels.skip(1) {
-        let mut next = space.planes(0, 0, MOTION);
-        coarser(&out, site_counts(workspace.pyramid.levels()[level].size), &mut next);
+        let size = site_counts(workspace.pyramid.levels()[level].size);
+        let mut next = space.planes(size.0, size.1, MOTION);
+        coarser(&out, size, &mut next);
         space.keep(std::mem::replace(&mut out, next));
     }
     out

@@ -237,8 +237,12 @@ impl<T: SimdReal> Kernel<T> for Rows<'_, '_, T> {
             }
             for (spread, planes) in writer.spreads(band) {
                 for (k, plane) in planes.iter_mut().enumerate() {
-                    spread.row(k, y, &mut entries, &mut line);
-                    copy(&line, columns, &mut plane[places.clone()]);
+                    if columns == (0, 1) {
+                        spread.row(k, y, &mut entries, &mut plane[places.clone()]);
+                    } else {
+                        spread.row(k, y, &mut entries, &mut line);
+                        copy(&line, columns, &mut plane[places.clone()]);
+                    }
                 }
             }
             if writer.is_plain(y, band) {

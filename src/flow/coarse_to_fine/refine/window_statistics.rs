@@ -19,15 +19,14 @@ pub(in crate::flow::coarse_to_fine) struct WindowStatistics<T> {
     sites: (usize, usize),
     /// Standard deviations of the windows, px.
     pub sigmas: &'static [f64],
+    /// Variances of the steps from each window to the next, for noise of unit density.
+    step_variances: Vec<f64>,
 }
 
 impl<T: SimdReal> WindowStatistics<T> {
     pub(super) fn new(means: Planes<T>, choice: Choice<T>, (sites, sigmas): ((usize, usize), &'static [f64])) -> Self {
-        Self { means, choice: choice.planes, order: choice.order, sites, sigmas }
-    }
-
-    pub fn planes_mut(&mut self) -> [&mut Planes<T>; 2] {
-        [&mut self.means, &mut self.choice]
+        let step_variances = sigmas.windows(2).map(|pair| difference_variance(pair[0], pair[1])).collect();
+        Self { means, choice: choice.planes, order: choice.order, sites, sigmas, step_variances }
     }
 
     pub fn into_planes(self) -> [Planes<T>; 2] {
@@ -62,7 +61,7 @@ impl<T: SimdReal> WindowStatistics<T> {
 
     /// Regional squared change from the window `l` to the next, as a noise density, px^4.
     pub fn change(&self, l: usize, x: usize, y: usize) -> f64 {
-        at(&self.means, Layout::change(l), x, y).powi(4) / difference_variance(self.sigmas[l], self.sigmas[l + 1])
+        at(&self.means, Layout::change(l), x, y).powi(4) / self.step_variances[l]
     }
 }
 
