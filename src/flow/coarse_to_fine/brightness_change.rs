@@ -184,8 +184,8 @@ fn sample<T: SimdReal>(simd: Level, view: &View<'_, T>, motion: &Planes<T>) -> V
     (0..motion.height).into_par_iter().map(row).collect::<Vec<Vec<f64>>>().concat()
 }
 
-/// Gain and offset of the `other` brightness over the `known` one, on the sites; `None` if more than the share
-/// `most` of the difference remains.
+/// Gain and offset of the `other` brightness over the `known` one, on the sites; `None` if more than the
+/// share `most` of the difference remains.
 fn fit((width, height): (usize, usize), known: &[f64], other: &[f64], most: f64) -> Option<LightMap> {
     let pitch = (width.max(height) as f64 / WINDOWS).max(MIN_PITCH);
     let [columns, rows] = [width, height].map(|len| ((len as f64 - 1.0) / pitch).ceil() as usize + 1);
