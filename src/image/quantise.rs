@@ -3,6 +3,10 @@
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::Frame;
+use rayon::prelude::*;
+
+/// Samples of a parallel task.
+const PART: usize = 1 << 16;
 
 /// Rounds samples down to a multiple of a step: `floor(x / step) * step`.
 ///
@@ -47,15 +51,24 @@ impl Quantiser {
 pub(crate) fn are_rounded<T: Real>(frames: &[&Frame<T>]) -> bool {
     const STEPS: f64 = 8.0;
     let range = |frame: &&Frame<T>| {
-        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-        for value in frame.data().iter().map(|value| value.to_f64()).filter(|value| value.is_finite()) {
-            if value.fract() != 0.0 {
-                return None;
-            }
-            (least, most) = (least.min(value), most.max(value));
-        }
-        Some((least, most))
+        let both = |a: (f64, f64), b: (f64, f64)| Some((a.0.min(b.0), a.1.max(b.1)));
+        frame.data().par_chunks(PART).map(whole_range).try_reduce(|| (f64::INFINITY, f64::NEG_INFINITY), both)
     };
     let ranges: Option<Vec<_>> = frames.iter().map(range).collect();
     ranges.is_some_and(|ranges| ranges.iter().any(|(least, most)| most - least >= STEPS))
+}
+
+/// The least and the greatest of the finite values; `None` if one is no whole number.
+fn whole_range<T: Real>(values: &[T]) -> Option<(f64, f64)> {
+    // Adding this rounds what is smaller to whole numbers; what is greater has no fraction in most formats.
+    const ROUNDING: f64 = 1.5 * (1u64 << 52) as f64;
+    let (mut least, mut most, mut are_whole) = (f64::INFINITY, f64::NEG_INFINITY, true);
+    for value in values.iter().map(|value| value.to_f64()) {
+        let is_finite = value.abs() < f64::INFINITY;
+        // Without a short circuit, so that the compiler uses lanes.
+        are_whole &= ((value + ROUNDING) - ROUNDING == value) | (value.abs() >= ROUNDING / 3.0) | value.is_nan();
+        least = if is_finite & (value < least) { value } else { least };
+        most = if is_finite & (value > most) { value } else { most };
+    }
+    are_whole.then_some((least, most))
 }

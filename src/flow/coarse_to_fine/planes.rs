@@ -34,9 +34,9 @@ impl<T: SimdReal> Planes<T> {
         (self.width, self.height, self.count) = (width, height, count);
         let len = self.row_len() * height;
         if len > self.data.len() {
-            // A new vector instead of a longer one: the content is not copied.
-            self.data.clear();
-            self.data.resize(len, T::from_f64(0.0));
+            // A new vector instead of a longer one: the content is not copied, and its size is exact.
+            self.data = Vec::new();
+            self.data = vec![T::from_f64(0.0); len];
         }
     }
 

@@ -61,7 +61,7 @@ impl Windowed {
         field: &mut FlowField<T>,
     ) {
         let sites = field.layout.sites.clone();
-        let images = (frames, common, common.covariance && are_rounded(frames));
+        let images = (frames, common, common.covariance && common.threads.install(|| are_rounded(frames)));
         let (columns, rows) = (field.width, field.height);
         common.threads.install(|| match &sites {
             SamplingGrid::Grid { stride, .. } if columns * rows > 0 => {

@@ -127,6 +127,9 @@ fn distances(width: usize, constrained: &[bool]) -> Vec<f64> {
         for n in 0..sites {
             let x = n % width;
             let mut shortest = out[n];
+            if shortest == 0.0 {
+                continue;
+            }
             if x > 0 {
                 shortest = shortest.min(out[n - 1] + straight);
             }

@@ -16,7 +16,8 @@
 
 use super::scratch::{CHUNK, Columns, LEFT};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
-use crate::flow::coarse_to_fine::planes::Planes;
+use crate::flow::coarse_to_fine::planes::{self, Planes};
+use crate::parallel::for_each_band;
 use crate::simd::{Lanes, SimdReal};
 
 pub(in super::super) const COUNT: usize = 26;
@@ -52,10 +53,15 @@ pub(in super::super) const SUMMARY: usize = 5;
 /// Summary of a data term for later stages: all its planes would be most of an estimate's memory.
 pub(in super::super) fn summary<T: SimdReal>(space: &PlanePool<T>, data: &Planes<T>) -> Planes<T> {
     let mut out = space.planes(data.width, data.height, SUMMARY);
-    let planes = [(UU, normal(0, 0)), (UV, normal(0, 1)), (VV, normal(1, 1)), (ENERGY, ERROR), (SEEN, VALID)];
-    for (y, (to, from)) in (0..data.height).flat_map(|y| planes.map(|pair| (y, pair))) {
-        out.line_mut(to, y).copy_from_slice(data.line(from, y));
-    }
+    let pairs = [(UU, normal(0, 0)), (UV, normal(0, 1)), (VV, normal(1, 1)), (ENERGY, ERROR), (SEEN, VALID)];
+    let (stride, len) = (out.stride(), out.row_len());
+    for_each_band(out.data_mut(), len, |_, rows, out| {
+        for (y, out) in rows.zip(out.chunks_exact_mut(len)) {
+            for (to, from) in pairs {
+                out[to * stride + planes::LEFT..][..data.width].copy_from_slice(data.line(from, y));
+            }
+        }
+    });
     out
 }
 

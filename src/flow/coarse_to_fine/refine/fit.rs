@@ -75,14 +75,12 @@ impl<T: SimdReal> Kernel<T> for Fits<'_, T> {
     }
 }
 
-/// Single fits of the window `scale` to `from` (planes of [`FLOW`]): planes of [`FIT`].
-pub(super) fn fits<T: SimdReal>(simd: Level, space: &PlanePool<T>, from: &Field<T>, scale: &Scale<T>) -> Field<T> {
-    let mut out = Field::make(space, from.width, from.height, FIT);
+/// Single fits of the window `scale` to `from` (planes of [`FLOW`]) to `out`, planes of [`FIT`].
+pub(super) fn fits<T: SimdReal>(simd: Level, from: &Field<T>, scale: &Scale<T>, out: &mut Field<T>) {
     let len = out.row_len();
     for_each_band(out.rows_mut(), len, |_, rows, out| dispatch(simd, Fits { from, scale, rows, out }));
     out.extend(0..2, Continuation::Odd, RIM);
     out.extend(2..FIT, Continuation::Even, RIM);
-    out
 }
 
 struct Halve<'a, T> {
@@ -200,19 +198,10 @@ impl<T: SimdReal> Kernel<T> for Samples<'_, T> {
     }
 }
 
-/// u and v of `1 - (1 - K)^4` at every `step`-th site.
-pub(super) fn samples<T: SimdReal>(
-    simd: Level,
-    space: &PlanePool<T>,
-    fits: &Field<T>,
-    scale: &Scale<T>,
-    step: usize,
-) -> Field<T> {
-    let (width, height) = (fits.width.div_ceil(step), fits.height.div_ceil(step));
-    let mut out = Field::make(space, width, height, 2);
-    let (len, stride, again) = (out.row_len(), out.stride(), &scale.again);
+/// u and v of `1 - (1 - K)^4` at every `step`-th site to the two planes of `out`.
+pub(super) fn samples<T: SimdReal>(simd: Level, fits: &Field<T>, scale: &Scale<T>, step: usize, out: &mut Field<T>) {
+    let (len, stride, width, again) = (out.row_len(), out.stride(), out.width, &scale.again);
     for_each_band(out.rows_mut(), len, |_, rows, out| {
         dispatch(simd, Samples { fits, again, step, rows, out, stride, width });
     });
-    out
 }

@@ -40,8 +40,8 @@ use super::planes::{LEFT, Planes, SITE_SPACING};
 use crate::simd::{Level, SimdReal};
 use extended::Field;
 use fit::{FIT, FLOW};
-use ladder::Ladder;
 pub(super) use ladder::TERMS;
+use ladder::{Ladder, Scale};
 pub(super) use options::RefineOptions;
 use rayon::prelude::*;
 use regional_means::Fitted;
@@ -63,10 +63,17 @@ pub(super) fn refine<T: SimdReal>(
     let ladder = Ladder::new(options.ladder, SITE_SPACING);
     let base = mean_motion(motion);
     let grids = grids(simd, space, &ladder, motion, &base);
-    let scales = ladder.scales.par_iter();
-    let mut fits: Vec<_> = scales.clone().map(|s| fit::fits(simd, space, &grids[s.octave], s)).collect();
-    let samples = scales.zip(&fits);
-    let samples = samples.map(|(s, f)| fit::samples(simd, space, f, s, if s.octave == 0 { 2 } else { 1 })).collect();
+    // Memory in one order, so that it does not depend on the threads.
+    let field = |octave: usize, step: usize, count: usize| {
+        let grid = &grids[octave];
+        Field::make(space, grid.width.div_ceil(step), grid.height.div_ceil(step), count)
+    };
+    let sample_step = |scale: &Scale<T>| if scale.octave == 0 { 2 } else { 1 };
+    let mut fits: Vec<_> = ladder.scales.iter().map(|s| field(s.octave, 1, FIT)).collect();
+    fits.par_iter_mut().zip(&ladder.scales).for_each(|(out, s)| fit::fits(simd, &grids[s.octave], s, out));
+    let mut samples: Vec<_> = ladder.scales.iter().map(|s| field(s.octave, sample_step(s), 2)).collect();
+    let fitted = samples.par_iter_mut().zip(&fits).zip(&ladder.scales);
+    fitted.for_each(|((out, fits), s)| fit::samples(simd, fits, s, sample_step(s), out));
     let fitted = Fitted { fits: &fits, samples };
     let means = regional_means::regional_means(simd, space, options, &ladder, &fitted, data);
     Field::keep(space, fitted.samples);

@@ -73,13 +73,20 @@ fn mean_square(taps: &[[f64; 3]], z: &dyn Fn(isize, isize) -> f64, x: isize, y: 
     terms.sum()
 }
 
+fn fits_of(grid: &Field<f64>, scale: &Scale<f64>) -> Field<f64> {
+    let mut fits = Field::new(grid.width, grid.height, FIT);
+    fit::fits(Level::detect(), grid, scale, &mut fits);
+    fits
+}
+
 #[test]
 fn fits_are_affine_in_their_windows_and_samples_are_repeated_fits() {
     let motion = field::<f64>(WIDTH, HEIGHT, rough);
     let (ladder, grids) = finest(&motion);
     for scale in &ladder.scales[..3] {
-        let fits = fit::fits(Level::detect(), &PlanePool::default(), &grids[0], scale);
-        let samples = fit::samples(Level::detect(), &PlanePool::default(), &fits, scale, 2);
+        let fits = fits_of(&grids[0], scale);
+        let mut samples = Field::new(fits.width.div_ceil(2), fits.height.div_ceil(2), 2);
+        fit::samples(Level::detect(), &fits, scale, 2, &mut samples);
         for (x, y) in [(0, 0), (3, 1), (18, 12), (36, 25), (20, 24)] {
             let mut misfit = 0.0;
             for k in 0..2 {
@@ -133,7 +140,7 @@ fn edge_fits_are_the_mixture_of_nine_windows() {
     let ladder = Ladder::<f64>::new(options.ladder, SITE_SPACING);
     let grids = grids(Level::detect(), &PlanePool::default(), &ladder, &motion, &base);
     let scale: &Scale<f64> = &ladder.scales[0];
-    let fits = fit::fits(Level::detect(), &PlanePool::default(), &grids[0], scale);
+    let fits = fits_of(&grids[0], scale);
     for (x, y) in [(5, 5), (15, 12), (16, 12), (30, 20)] {
         // For the flow, and for its slopes, which have sharper weights.
         let (mut sum, mut total) = ([0.0; 6], [0.0; 2]);
