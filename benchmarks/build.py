@@ -117,7 +117,8 @@ def main() -> None:
 
 def compile_and_measure(command: list[str]) -> int:
     """Runs the compiler in cargo's place and notes its CPU seconds."""
-    returned = subprocess.run(command, check=False).returncode
+    # Open files hold the tokens by which cargo limits threads.
+    returned = subprocess.run(command, check=False, close_fds=False).returncode
     with Path(os.environ[MEASURED]).open("a") as file:
         file.write(f"{used():.2f}\n")
     return returned
