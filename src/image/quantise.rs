@@ -59,6 +59,7 @@ pub(crate) fn are_rounded<T: Real>(frames: &[&Frame<T>]) -> bool {
 }
 
 /// The least and the greatest of the finite values; `None` if one is no whole number.
+#[allow(clippy::needless_bitwise_bool)]
 fn whole_range<T: Real>(values: &[T]) -> Option<(f64, f64)> {
     // Adding this rounds what is smaller to whole numbers; what is greater has no fraction in most formats.
     const ROUNDING: f64 = 1.5 * (1u64 << 52) as f64;
