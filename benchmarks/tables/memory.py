@@ -1,9 +1,13 @@
-"""Peak of resident memory during one estimate, over that before it, in planes of one 4-byte number per pixel.
+"""Memory of dense estimates.
 
     python -m benchmarks.tables.memory
 
-Each estimate runs in a process of its own, which has made one on small frames before: what libraries take
-once is not counted. The result is counted.
+`memory`: peak of resident memory during one estimate, over that before it, in planes of one 4-byte number per
+pixel. Each estimate runs in a process of its own, which has made one on small frames before: what libraries
+take once is not counted. The result is counted.
+
+`faults`: page faults per frame of a stream and per call of `estimate`, after the third, each result replacing
+the one before; and the processor time of a stream with covariance over that without.
 """
 
 from __future__ import annotations
@@ -12,9 +16,11 @@ import resource
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,9 +31,11 @@ PRESETS = ("fast", "balanced", "accurate")
 SIZE = (1920, 1080)
 """Width and height of the frames, px."""
 CHILD = "--child"
-"""First argument of a process that makes one estimate."""
+"""First argument of a process that makes estimates."""
 WARM_UP = 64
 """Side of the small frames, px."""
+BEFORE, COUNTED = 3, 8
+"""Estimates of a stream that are not counted, and that are."""
 
 
 def frames(width: int, height: int) -> np.ndarray:
@@ -61,48 +69,105 @@ def highest() -> float:
         )
 
 
-def measure(file: str, preset: str, count: int, covariance: bool) -> float:
+def method(preset: str, count: int) -> jacoflow.CoarseToFine:
+    """The method for so many frames."""
+    return jacoflow.CoarseToFine(preset=preset, time_scheme="pair" if count == 2 else None)
+
+
+def peak(file: str, preset: str, count: int, covariance: bool) -> list[float]:
     """Planes that the estimate from the last `count` frames of the file needs, in this process."""
     given = [np.ascontiguousarray(frame) for frame in np.load(file)[-count:]]
-    method = jacoflow.CoarseToFine(preset=preset, time_scheme="pair" if count == 2 else None)
-    jacoflow.estimate([frame[:WARM_UP, :WARM_UP] for frame in given], method=method, covariance=covariance)
+    chosen = method(preset, count)
+    jacoflow.estimate([frame[:WARM_UP, :WARM_UP] for frame in given], method=chosen, covariance=covariance)
     before = highest()
-    jacoflow.estimate(given, method=method, covariance=covariance)
-    return (highest() - before) / (4.0 * given[0].size)
+    jacoflow.estimate(given, method=chosen, covariance=covariance)
+    return [(highest() - before) / (4.0 * given[0].size)]
 
 
-def rows(width: int, height: int) -> Iterator[dict[str, object]]:
-    """One row a preset and number of frames: planes without and with covariance, the result's among them."""
+def stream(file: str, preset: str, count: int, covariance: bool) -> list[float]:
+    """Page faults per frame of a stream, and its processor time, ms; the frames go there and back."""
+    given = list(np.load(file))
+    there_and_back = [given[(0, 1, 2, 1)[k % 4]] for k in range(count - 1 + BEFORE + COUNTED)]
+    estimator = jacoflow.FlowEstimator(method=method(preset, count), covariance=covariance)
+    return counted(estimator.push, there_and_back)
+
+
+def calls(file: str, preset: str, count: int, covariance: bool) -> list[float]:
+    """The same of calls of `estimate`."""
+    given = [np.ascontiguousarray(frame) for frame in np.load(file)[-count:]]
+    chosen = method(preset, count)
+    return counted(
+        lambda frames: jacoflow.estimate(frames, method=chosen, covariance=covariance),
+        [given] * (BEFORE + COUNTED),
+    )
+
+
+def counted(step: Callable[[Any], object], arguments: Sequence[object]) -> list[float]:
+    """Page faults and processor time, ms, per call of the last calls of `step`."""
+    result = None
+    for argument in arguments[:-COUNTED]:
+        result = step(argument)
+    before, started = resource.getrusage(resource.RUSAGE_SELF).ru_minflt, time.process_time()
+    for argument in arguments[-COUNTED:]:
+        result = step(argument)
+    spent = 1e3 * (time.process_time() - started) / COUNTED
+    faults = (resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before) / COUNTED
+    del result
+    return [faults, spent]
+
+
+MODES = {mode.__name__: mode for mode in (peak, stream, calls)}
+
+
+def in_child(mode: str, file: Path, preset: str, count: int, covariance: bool) -> list[float]:
+    """What a mode measures, in a process of its own."""
+    options = [mode, str(file), preset, str(count), str(int(covariance))]
+    command = [sys.executable, "-m", "benchmarks.tables.memory", CHILD, *options]
+    found = subprocess.run(command, check=True, capture_output=True, text=True)
+    return [float(number) for number in found.stdout.split()]
+
+
+def cases(width: int, height: int) -> Iterator[tuple[Path, str, int]]:
+    """The frames' file, every preset and number of frames."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "frames.npy"
         np.save(file, frames(width, height))
         for preset, count in product(PRESETS, (2, 3)):
-            row: dict[str, object] = {"preset": preset, "frames": count}
-            for covariance in (False, True):
-                child = [
-                    sys.executable,
-                    "-m",
-                    "benchmarks.tables.memory",
-                    CHILD,
-                    str(file),
-                    preset,
-                    str(count),
-                    str(int(covariance)),
-                ]
-                found = subprocess.run(child, check=True, capture_output=True, text=True)
-                row["planes_with_covariance" if covariance else "planes"] = float(found.stdout)
-            yield row
+            yield file, preset, count
+
+
+def rows(width: int, height: int) -> Iterator[dict[str, object]]:
+    """One row a preset and number of frames: planes without and with covariance, the result's among them."""
+    for file, preset, count in cases(width, height):
+        [without], [planes] = (in_child("peak", file, preset, count, covariance) for covariance in (False, True))
+        yield {"preset": preset, "frames": count, "planes": without, "planes_with_covariance": planes}
+
+
+def fault_rows(width: int, height: int) -> Iterator[dict[str, object]]:
+    """One row a preset and number of frames: page faults and the cost of the covariance."""
+    for file, preset, count in cases(width, height):
+        row: dict[str, object] = {"preset": preset, "frames": count}
+        spent = {}
+        for covariance in (False, True):
+            suffix = "_with_covariance" if covariance else ""
+            row[f"stream{suffix}"], spent[covariance] = in_child("stream", file, preset, count, covariance)
+            row[f"calls{suffix}"], _ = in_child("calls", file, preset, count, covariance)
+        yield {**row, "covariance_cost": spent[True] / spent[False]}
 
 
 TABLES = {
     "memory": report.Table(
         f"Peak of resident memory, planes of one 4-byte number per pixel, {SIZE[0]} x {SIZE[1]}",
         lambda _: list(rows(*SIZE)),
-    )
+    ),
+    "faults": report.Table(
+        f"Page faults per frame and per call, {SIZE[0]} x {SIZE[1]}; time with covariance over that without",
+        lambda _: list(fault_rows(*SIZE)),
+    ),
 }
 
 if __name__ == "__main__":
-    if len(sys.argv) == 6 and sys.argv[1] == CHILD:
-        print(measure(sys.argv[2], sys.argv[3], int(sys.argv[4]), sys.argv[5] == "1"))
+    if len(sys.argv) == 7 and sys.argv[1] == CHILD:
+        print(*MODES[sys.argv[2]](sys.argv[3], sys.argv[4], int(sys.argv[5]), sys.argv[6] == "1"))
     else:
         report.main(__doc__, TABLES)

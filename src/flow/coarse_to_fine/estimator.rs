@@ -50,7 +50,7 @@ impl CoarseToFine {
         field: &mut FlowField<T>,
     ) {
         common.threads.install(|| {
-            let mut workspace = self.store.take::<T>();
+            let mut workspace = self.store.take::<T>(frames[0].size());
             let (plan, coarse, noise_gain) =
                 self.coarse_levels(&mut workspace, frames, common, field.covariance.is_some());
             let (coarse, iterations) = match common.initial.as_deref() {

@@ -4,19 +4,24 @@ use super::planes::Planes;
 use crate::simd::SimdReal;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+/// Maximum size of a block over what is needed: least memory at the peak of three frames.
+const MAX_ROOM_RATIO: f64 = 1.5;
+
 #[derive(Debug, Default)]
 pub(super) struct PlanePool<T> {
     free: Mutex<Vec<Planes<T>>>,
 }
 
 impl<T: SimdReal> PlanePool<T> {
-    /// Planes with any finite content: the smallest free ones large enough, or the largest, enlarged.
+    /// Planes with any finite content: the smallest free ones large enough, but not much larger, since others
+    /// need those; or else the largest smaller ones, enlarged.
     pub fn planes(&self, width: usize, height: usize, count: usize) -> Planes<T> {
         let len = Planes::<T>::len(width, height, count);
         let mut free = lock(&self.free);
         let fit =
             |planes: &Planes<T>| if planes.room() < len { (1, usize::MAX - planes.room()) } else { (0, planes.room()) };
-        let best = (0..free.len()).min_by_key(|&at| fit(&free[at]));
+        let allowed = (0..free.len()).filter(|&at| free[at].room() as f64 <= MAX_ROOM_RATIO * len as f64);
+        let best = allowed.min_by_key(|&at| fit(&free[at]));
         let mut planes = best.map(|at| free.swap_remove(at)).unwrap_or_default();
         planes.reshape(width, height, count);
         planes

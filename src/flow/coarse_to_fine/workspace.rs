@@ -11,6 +11,8 @@ use std::sync::Mutex;
 
 #[derive(Debug, Default)]
 pub(super) struct Workspace<T> {
+    /// Size of the frames, px.
+    size: (usize, usize),
     pub pyramid: Pyramid<T>,
     pub pool: Pool<T>,
     pub scratch: RegularizeScratch<T>,
@@ -36,11 +38,12 @@ pub(super) struct WorkspaceStore {
 }
 
 impl WorkspaceStore {
-    /// A workspace, reused if possible.
-    pub fn take<T: SimdReal>(&self) -> Box<Workspace<T>> {
+    /// A workspace for frames of `size` px, reused if possible: others have blocks of other sizes.
+    pub fn take<T: SimdReal>(&self, size: (usize, usize)) -> Box<Workspace<T>> {
         let own = lock(&self.free).pop();
         let any = own.or_else(|| lock(LAST.get()).take());
-        any.and_then(|any| any.downcast().ok()).unwrap_or_default()
+        let known = any.and_then(|any| any.downcast::<Workspace<T>>().ok());
+        known.filter(|known| known.size == size).unwrap_or_else(|| Box::new(Workspace { size, ..Workspace::default() }))
     }
 
     pub fn put_back<T: SimdReal>(&self, workspace: Box<Workspace<T>>) {

@@ -97,15 +97,19 @@ pub(super) fn covariance<T: SimdReal>(
     let textured_support = textured_support(&noise, &estimate.data, (width, height));
     let textured_support = textured_support.as_ref().unwrap_or(&support);
     let extrapolation = Extrapolation::new(&estimate.motion, statistics, textured_support);
-    let constrained = ConstrainedDirections::new(&estimate.data, &noise, (width, height));
-    let coarse_errors = CoarseLevelErrors::new(&estimate.motion, &estimate.coarser_motions, constrained);
-    let coarse_errors = coarse_errors.at_nodes((width, height));
+    let kind = usize::from(!is_pair);
+    // Beside each other: one thread does much of either.
+    let (coarse_errors, mut nodes) = rayon::join(
+        || {
+            let constrained = ConstrainedDirections::new(&estimate.data, &noise, (width, height));
+            CoarseLevelErrors::new(&estimate.motion, &estimate.coarser_motions, constrained).at_nodes((width, height))
+        },
+        || curvature_bias::curvature_bias(&estimate.motion, statistics, CURVATURE_SHARES[kind]),
+    );
     let change = estimate.acceleration.as_ref();
     let change = change.map(|statistics| {
         Noise::new(statistics, data, energy.times(NEXT_FRAME_ENERGY), true).at_least_as_noisy_as(&noise)
     });
-    let kind = usize::from(!is_pair);
-    let mut nodes = curvature_bias::curvature_bias(&estimate.motion, statistics, CURVATURE_SHARES[kind]);
     let complete = |(n, node): (usize, &mut Entries)| {
         let at = (n % width, n / width);
         let motion = curvature_bias::motion_at(&estimate.motion, at);

@@ -171,7 +171,7 @@ impl DescentPlan {
         (start, residual_std): (Planes<T>, Option<T>),
         (schedules, to): (&[LevelSchedule], usize),
     ) -> DescentResult<T> {
-        let Workspace { pyramid, pool, scratch, space } = workspace;
+        let Workspace { pyramid, pool, scratch, space, .. } = workspace;
         let (width, height) = site_counts(pyramid.levels()[to].size);
         let mut data = space.planes(width, height, COUNT);
         let term = DataTerm::new(self.simd, DataOptions::default(), pool);
