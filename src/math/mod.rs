@@ -10,6 +10,6 @@ mod ziggurat;
 
 pub use real::Real;
 pub use statistics::{
-    MAD_TO_STD, RARE_STDS, by_chance, central_median, chi2_deviation, geman_mcclure, median, nearest_quantile,
-    quantile, robust_std,
+    MAD_TO_STD, RARE_STDS, TRUNCATED_INFORMATION, binomial_tail, by_chance, central_median, chi2_deviation,
+    geman_mcclure, median, nearest_quantile, quantile, robust_std, truncated_std,
 };

@@ -45,4 +45,30 @@ impl CounterRng {
         let radius = (-2.0 * (1.0 - self.uniform(2 * index)).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform(2 * index + 1)).cos()
     }
+
+    /// `count` different indices below `n` at random, ascending; all of fewer.
+    pub fn sample(&self, n: usize, count: usize) -> Vec<u32> {
+        if count >= n {
+            return (0..n as u32).collect();
+        }
+        // Those with the smallest random keys.
+        let mut keyed: Vec<(u64, u32)> = (0..n as u32).map(|k| (self.bits(u64::from(k)), k)).collect();
+        keyed.select_nth_unstable(count - 1);
+        let mut chosen: Vec<u32> = keyed[..count].iter().map(|&(_, k)| k).collect();
+        chosen.sort_unstable();
+        chosen
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_are_different_indices() {
+        let chosen = CounterRng::new(4).sample(100, 30);
+        assert!(chosen.len() == 30 && chosen.windows(2).all(|pair| pair[0] < pair[1]) && chosen[29] < 100);
+        assert_ne!(chosen, CounterRng::new(5).sample(100, 30));
+        assert_eq!(CounterRng::new(5).sample(3, 30), [0, 1, 2]);
+    }
 }

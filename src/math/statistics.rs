@@ -37,6 +37,46 @@ pub fn robust_std<T: Real>(absolute_deviations: &mut [T]) -> Option<f64> {
     median(absolute_deviations).map(|median| MAD_TO_STD * median.to_f64())
 }
 
+/// Residuals that determine [`truncated_std`], in standard deviations; their mean square relative to the
+/// variance, for a normal distribution cut there.
+const CUT: f64 = 2.5;
+const CUT_VARIANCE: f64 = 0.911;
+
+/// The share of the information about a variance that is left to residuals cut at 2.5 standard deviations.
+pub const TRUNCATED_INFORMATION: f64 = 0.69;
+
+/// Standard deviation of Gaussian noise among outliers: the fixed point of the root mean square of the
+/// residuals below 2.5 standard deviations, divided by that of a normal distribution cut there. Begins at 1;
+/// `unknowns` that were fitted take their share away.
+pub fn truncated_std(residuals: &[f64], unknowns: usize) -> f64 {
+    let mut std = 1.0;
+    for _ in 0..50 {
+        let near = || residuals.iter().filter(|e| e.abs() < CUT * std);
+        let (sum, count) = (near().map(|e| e * e).sum::<f64>(), near().count());
+        if count <= unknowns || sum <= 0.0 {
+            break;
+        }
+        let next = (sum / (CUT_VARIANCE * (count - unknowns) as f64)).sqrt();
+        let settled = (next - std).abs() < 1e-6 * std;
+        std = next;
+        if settled {
+            break;
+        }
+    }
+    std
+}
+
+/// Probability of at least `hits` among `n` draws that hit with probability `p`.
+pub fn binomial_tail(hits: usize, n: usize, p: f64) -> f64 {
+    let mut term = n as f64 * p.ln();
+    let mut sum = 0.0;
+    for missed in 0..=n - hits {
+        sum += term.exp();
+        term += ((n - missed) as f64 / (missed + 1) as f64 * (1.0 - p) / p).ln();
+    }
+    sum
+}
+
 /// Weight of a residual in robust least squares, `1 / (1 + (residual / scale)^2)^2` (S. Geman and D. McClure,
 /// 1987).
 pub fn geman_mcclure(residual: f64, scale: f64) -> f64 {

@@ -4,8 +4,7 @@ use super::kernels::{equations, information, slopes};
 use super::model::input::{Flow, Noise, Placement};
 use super::model::motion::Motion;
 use super::model::observations::{Observations, UNKNOWNS};
-use super::model::result::{axes, nested};
-use super::model::rows::{Matrix5, tangents};
+use super::model::rows::{Matrix5, nested, tangents};
 use super::model::whitening::Whitening;
 use super::solver::covariance::{determined, direction_deviation};
 use crate::error::{Error, Result, numbers};
@@ -45,7 +44,7 @@ impl MotionBound {
             likelihood: nested(&likelihood),
             ideal: nested(&ideal),
             direction_std: [bound, likelihood, ideal].map(|covariance| direction_deviation(&covariance)),
-            tangent: axes(tangent),
+            tangent: nested(tangent),
         })
     }
 }
@@ -93,8 +92,7 @@ fn of_known_depths(
     MotionBound::of(&tangent, &m, &noise, |bound| weighted_noise(&observations, motion, &tangent, &nu, bound))
 }
 
-/// Which of the usable points, that come from `source` among all `places`, have a known depth: `least` of
-/// them.
+/// Which of the usable points, from `source` among all `places`, have a known depth: at least `least`.
 pub(crate) fn with_known_depth<const N: usize, D>(
     source: &[u32],
     (places, depths): (&[[f64; N]], &[D]),

@@ -252,18 +252,15 @@ impl Task<'_, '_> {
         if let Some(known) = self.known {
             solution.weighted_by_posterior(&scaled.observations, known, self.options.weight_depths.is_some());
         }
-        let common = solution.systematic_effect(inliers, self.whitening.flow, &self.options.systematic_errors());
-        let length = self.options.correlation_length.filter(|length| *length > 0.0);
-        solution.add_correlation(inliers, self.whitening.flow, length);
         let wider = match (scaled.unknown, self.known) {
             (true, known) => of_estimated_noise(inliers.n, known.is_some()),
             // The residuals determine how large correlated errors are.
-            (false, _) if length.is_some() => 1.0,
+            (false, _) if self.options.correlation().is_some() => 1.0,
             (false, None) => misfit(inliers, cost),
             // What outliers leave among truncated residuals is accounted for.
             (false, Some(_)) => larger(&scaled.observations, &solution.motion),
         };
-        solution.inflate(inliers, wider, common);
+        solution.inflate(inliers, self.whitening.flow, self.options, wider);
     }
 }
 

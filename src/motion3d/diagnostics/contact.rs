@@ -2,14 +2,14 @@
 
 use crate::error::Result;
 use crate::math::Real;
-use crate::motion3d::model::input::{Placement, check_field};
+use crate::motion3d::model::input::{Placement, check_field, measurement};
 use crate::motion3d::model::observations::Row;
 use crate::motion3d::model::result::{CommonEffect, UncertainMotion};
 use crate::motion3d::model::rows::{Derotation, Matrix5, MidpointDepth, Vector5};
 use crate::motion3d::model::whitening::plane_row;
 use crate::parallel::Threads;
-use crate::types::{FlowField, Intrinsics, Status};
-use nalgebra::{Matrix2, Matrix2x3, RowVector2, SVector, Vector2, Vector3};
+use crate::types::{FlowField, Intrinsics};
+use nalgebra::{Matrix2x3, RowVector2, SVector, Vector2, Vector3};
 use rayon::prelude::*;
 
 /// Rates of approach `nu u_z` under a motion.
@@ -34,9 +34,8 @@ impl Rates {
         Self { u: of.motion.u(), w: of.motion.w(), tangent, covariance, common: of.common }
     }
 
-    /// Slopes of `nu u_z` along the axes of `u` and along `w`, for a point whose `nu^ = T . d / s^2`: those
-    /// of `nu^` are `-nu T . (G e) / s^2` and `-(T . R) / s^2`; none at the epipole, where a depth is its
-    /// neighbours'.
+    /// Slopes of `nu u_z` of a point with `nu^ = T . d / s^2`, whose own slopes are `-nu T . (G e) / s^2` and
+    /// `-(T . R) / s^2`; none at the epipole, where a depth is its neighbours'.
     pub fn slopes(&self, row: &Row, nu: f64) -> Slopes {
         let t = row.g * self.u;
         let s2 = t.norm_squared();
@@ -143,21 +142,16 @@ pub fn contact_map<T: Real>(
 /// A site's whitened flow, as a displacement with the rotation taken out of it if there is a `turn`; `None`
 /// where it is not valid.
 fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, turn: Option<&Derotation>, site: usize) -> Option<Row> {
-    if !field.status[site].is_valid() || field.status[site] == Status::Inconsistent {
-        return None;
-    }
-    let [[uu, uv, ..], [_, vv, ..], ..] = field.covariance_at(site)?;
-    let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
+    let (flow, covariance) = measurement(field, site)?;
     let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
-    let (at, covariance) = ([x as f64, y as f64], Matrix2::new(uu, uv, uv, vv));
-    let row = plane_row(at, [u, v], &covariance, Some(camera), (Placement::Start, turn));
+    let row = plane_row([x as f64, y as f64], flow.into(), &covariance, Some(camera), (Placement::Start, turn));
     row.map(|(row, _)| row)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion3d::model::result::{UNKNOWN, axes};
+    use crate::motion3d::model::result::UNKNOWN;
     use crate::motion3d::tests::scenes::Scene;
 
     /// The slopes of the rate are those of the depth that a point's own flow has.
@@ -168,7 +162,7 @@ mod tests {
         let tangent = crate::motion3d::model::rows::tangents(&scene.motion.u());
         let known = UncertainMotion {
             motion: scene.motion,
-            tangent: axes(&tangent),
+            tangent: crate::motion3d::model::rows::nested(&tangent),
             covariance: UNKNOWN,
             common: CommonEffect::default(),
         };

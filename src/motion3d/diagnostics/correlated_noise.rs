@@ -3,22 +3,20 @@
 //! Sums over points that are taken for independent make the covariance too small where neighbours err alike.
 //! With the correlation `rho(d)` of two errors at the distance `d`, the equations `sum W^t e` have the
 //! covariance `sum_kl rho(d_kl) W_k^t W_l` instead of `sum W^t W`: neighbours count by how much their rows
-//! agree, so that points which decide alone change little. How far errors correlate beyond the given length,
-//! and how large they are, is estimated from the residuals ([`Errors`]): what a scene does to flow (edges in
-//! depth, a texture that smoothing reaches across) goes together farther than its windows, and differs from
-//! field to field.
+//! agree. How far errors correlate beyond the given length, and how large they are, is estimated from the
+//! residuals ([`Errors`]): edges in depth correlate errors farther than windows do.
 
 use crate::motion3d::kernels::{depths, information, slopes};
 use crate::motion3d::model::input::Flow;
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::observations::{Observations, Row};
 use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::solver::covariance::inverse;
 use nalgebra::{Matrix2x3, Matrix3, SymmetricEigen, Vector3};
 use rayon::prelude::*;
 
-/// What was measured on the residuals of windowed flow of a drive: this share falls off as fast as windows
-/// stop sharing pixels, the rest over so many correlation lengths.
+/// Share of correlation that falls off as windows stop sharing pixels, and the length, in correlation
+/// lengths, of the rest: measured on residuals of a recorded drive.
 const QUICK: f64 = 0.4;
 const TAIL: f64 = 3.75;
 
@@ -64,11 +62,11 @@ pub(crate) fn correlated_covariance(
     let back = l.try_inverse()?;
     let larger = Matrix5::identity() + positive(&(back * correlation_excess(&points, &errors) * back.transpose()));
     let normalised = l.transpose() * covariance * l;
-    let normalised = SymmetricEigen::new(0.5 * (normalised + normalised.transpose()));
+    let normalised = SymmetricEigen::new(normalised.symmetric_part());
     let root = normalised.eigenvalues.map(|size| size.max(0.0).sqrt());
     let root = normalised.eigenvectors * Matrix5::from_diagonal(&root) * normalised.eigenvectors.transpose();
     let out = back.transpose() * root * larger * root * back;
-    let out = 0.5 * (out + out.transpose());
+    let out = out.symmetric_part();
     inverse(&out).map(|_| out)
 }
 
@@ -90,10 +88,9 @@ pub(crate) fn correlated_rotation_covariance(
     inverse.fixed_view::<3, 3>(2, 2).into_owned()
 }
 
-/// The part of a symmetric matrix above 0: below, the points would have more information than independent
-/// ones.
+/// The positive part of a symmetric matrix: correlation adds no information.
 fn positive(matrix: &Matrix5) -> Matrix5 {
-    let eigen = SymmetricEigen::new(0.5 * (matrix + matrix.transpose()));
+    let eigen = SymmetricEigen::new(matrix.symmetric_part());
     let sizes = eigen.eigenvalues.map(|size| size.max(0.0));
     eigen.eigenvectors * Matrix5::from_diagonal(&sizes) * eigen.eigenvectors.transpose()
 }
@@ -108,8 +105,7 @@ fn correlation_excess(points: &Neighbourhood, errors: &Errors) -> Matrix5 {
 /// points.
 const NEAR: f64 = 6.0;
 
-/// Fewer points than this do not determine how far errors correlate: by chance their residuals correlate as
-/// much.
+/// Minimum number of points that determine how far errors correlate.
 const FEWEST: usize = 30;
 
 /// By how much the correlation length may be longer than given, and the steps in which that is looked for.
@@ -139,8 +135,8 @@ impl Errors {
     /// which that makes residuals of neighbours as alike as they are.
     pub fn from_residuals(points: &Neighbourhood, inverse: &Matrix5, own: f64) -> Self {
         let squares: f64 = points.all.iter().map(|point| point.residual.powi(2)).sum();
-        let near = points.near();
-        let alike = near.alike / squares;
+        let (near, products) = points.near();
+        let alike = products / squares;
         let mut stretch = 1.0;
         let mut expected = points.expected(&near, inverse, stretch);
         while points.all.len() >= FEWEST && expected.alike < alike && stretch * STEP <= LONGEST {
@@ -169,14 +165,6 @@ pub(crate) struct Neighbourhood {
     all: Vec<Point>,
 }
 
-/// Sums over near pairs.
-struct Near {
-    /// Rows of the neighbours of each point, added up.
-    rows: Vec<Vector5>,
-    /// Products of residuals.
-    alike: f64,
-}
-
 /// What residuals are expected to be: their squares, in units of the errors', and products of near ones in
 /// units of that.
 struct Expected {
@@ -187,29 +175,25 @@ struct Expected {
 impl Neighbourhood {
     pub fn new(inliers: &Observations, at: &Weighted<'_>, flow: &Flow<'_>, length: f64) -> Self {
         let residuals = depths(inliers, at.motion).e;
-        let point = |k: usize| Point {
-            place: flow.place(inliers.source[k] as usize) / length,
-            row: slopes(inliers, at.motion, at.tangent, at.nu[k], k),
-            residual: residuals[k],
-        };
-        Self::of((0..inliers.n).map(point).collect())
+        let row = |k: usize| (slopes(inliers, at.motion, at.tangent, at.nu[k], k), residuals[k]);
+        Self::of(inliers, flow, length, row)
     }
 
     /// The same of one component of the flow that a rotation alone leaves.
     pub fn of_rotation(inliers: &Observations, w: &Vector3<f64>, axis: usize, flow: &Flow<'_>, length: f64) -> Self {
-        let point = |k: usize| {
-            let row = inliers.row(k);
-            let turn = row.r.row(axis);
-            Point {
-                place: flow.place(inliers.source[k] as usize) / length,
-                row: Vector5::new(0.0, 0.0, turn[0], turn[1], turn[2]),
-                residual: row.f[axis] - (turn * w)[0],
-            }
-        };
-        Self::of((0..inliers.n).map(point).collect())
+        Self::of(inliers, flow, length, |k| {
+            let Row { r, f, .. } = inliers.row(k);
+            let turn = r.row(axis);
+            (Vector5::new(0.0, 0.0, turn[0], turn[1], turn[2]), f[axis] - (turn * w)[0])
+        })
     }
 
-    fn of(mut all: Vec<Point>) -> Self {
+    fn of(inliers: &Observations, flow: &Flow<'_>, length: f64, row: impl Fn(usize) -> (Vector5, f64)) -> Self {
+        let point = |k: usize| {
+            let (row, residual) = row(k);
+            Point { place: flow.place(inliers.source[k] as usize) / length, row, residual }
+        };
+        let mut all: Vec<Point> = (0..inliers.n).map(point).collect();
         all.sort_by(|a, b| a.place.y.total_cmp(&b.place.y));
         Self { all }
     }
@@ -223,7 +207,7 @@ impl Neighbourhood {
     pub fn different(&self, stretch: f64) -> Matrix5 {
         let of_point = |k: usize| {
             let product = self.all[k].row * self.correlated(k, stretch).0.transpose();
-            0.5 * (product + product.transpose())
+            product.symmetric_part()
         };
         let (parts, each) = self.parts(of_point);
         parts.iter().sum::<Matrix5>() * each
@@ -253,35 +237,34 @@ impl Neighbourhood {
         (rows, near)
     }
 
-    fn near(&self) -> Near {
+    /// Rows of the neighbours of each point, added up, and products of near residuals.
+    fn near(&self) -> (Vec<Vector5>, f64) {
         let of_point = |k: usize| {
-            self.around(k, NEAR).filter(|(_, distance)| *distance < NEAR).fold(
-                (Vector5::zeros(), 0.0),
-                |(rows, alike), (l, _)| {
-                    let other = &self.all[l];
-                    (rows + other.row, alike + self.all[k].residual * other.residual)
-                },
-            )
+            let (mut rows, mut alike) = (Vector5::zeros(), 0.0);
+            for (l, _) in self.around(k, NEAR).filter(|(_, distance)| *distance < NEAR) {
+                rows += self.all[l].row;
+                alike += self.all[k].residual * self.all[l].residual;
+            }
+            (rows, alike)
         };
-        let of_points: Vec<(Vector5, f64)> = (0..self.all.len()).into_par_iter().map(of_point).collect();
-        let alike = of_points.iter().map(|(_, alike)| alike).sum();
-        Near { rows: of_points.into_iter().map(|(rows, _)| rows).collect(), alike }
+        let (rows, alike): (Vec<Vector5>, Vec<f64>) = (0..self.all.len()).into_par_iter().map(of_point).unzip();
+        (rows, alike.iter().sum())
     }
 
     /// With `U = R W`, `B = W^t U` and the rows `N` of neighbours added up, the products of near residuals
     /// are `sum R - 2 tr A^-1 U^t N + tr A^-1 B A^-1 W^t N`, and the squares the same with `N = W`.
-    fn expected(&self, near: &Near, inverse: &Matrix5, stretch: f64) -> Expected {
+    fn expected(&self, near: &[Vector5], inverse: &Matrix5, stretch: f64) -> Expected {
         let of_point = |k: usize| {
             let (rows, correlations) = self.correlated(k, stretch);
             let own = &self.all[k].row;
             let whole = rows + own;
-            (whole * own.transpose(), whole * near.rows[k].transpose(), correlations)
+            (whole * own.transpose(), whole * near[k].transpose(), correlations)
         };
         let (parts, each) = self.parts(of_point);
         let b: Matrix5 = parts.iter().map(|(own, _, _)| own).sum::<Matrix5>() * each;
         let n: Matrix5 = parts.iter().map(|(_, near, _)| near).sum::<Matrix5>() * each;
         let correlations = parts.iter().map(|(_, _, correlations)| correlations).sum::<f64>() * each;
-        let products: Matrix5 = self.all.iter().zip(&near.rows).map(|(point, near)| point.row * near.transpose()).sum();
+        let products: Matrix5 = self.all.iter().zip(near).map(|(point, near)| point.row * near.transpose()).sum();
         let middle = inverse * b * inverse;
         let count = self.all.len() as f64;
         let squares = count - 2.0 * (inverse * b).trace() + (middle * self.squares()).trace();

@@ -1,13 +1,9 @@
 //! The flow of one plane under any motion, and the second motion that explains it.
 //!
-//! Points of a plane `nu = n . eta` move by `(u n^t + [w]x) eta` relative to the camera: their flow is `f = G
-//! A eta` with a matrix `A` that is known up to a multiple of the unit matrix, eight numbers (H.
-//! Longuet-Higgins 1984). Over a whole frame it is `G A eta / (1 + a_3 . eta)`, `a_3` being the last row of
-//! `A`: a homography.
-//!
-//! Whether the flow is a plane's is tested on the flow itself: depths at an estimated motion depart from a
-//! plane's by what the motion is off, and by more than their own noise where that is small along the epipolar
-//! lines.
+//! Points of a plane `nu = n . eta` have the flow `f = G A eta`, `A = u n^t + [w]x` up to a multiple of the
+//! unit matrix: eight numbers (H. Longuet-Higgins 1984). Over a whole frame it is `G A eta / (1 + a_3 .
+//! eta)`, with the last row `a_3` of `A`: a homography. The test uses the flow itself, as depths depart from
+//! a plane's by the error of the motion, too.
 
 use crate::math::random::CounterRng;
 use crate::math::{RARE_STDS, by_chance, chi2_deviation};

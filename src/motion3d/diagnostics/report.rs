@@ -4,13 +4,14 @@ use super::contact::{Rates, Slopes};
 use super::correlated_noise::correlated_rotation_covariance;
 use super::rotation::{RotationOnly, contradicted_rotation};
 use super::solution::{Solution, rotation_shift};
+use crate::math::TRUNCATED_INFORMATION;
 use crate::motion3d::kernels::{Depths, Equations, depths, equations};
 use crate::motion3d::model::input::{Flow, to_plane};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::MotionOptions;
-use crate::motion3d::model::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN, axes, nested};
-use crate::motion3d::model::rows::{Matrix5, MidpointDepth};
+use crate::motion3d::model::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN};
+use crate::motion3d::model::rows::{Matrix5, MidpointDepth, nested};
 use crate::motion3d::model::whitening::TOGETHER;
 use crate::motion3d::robust;
 use crate::motion3d::robust::Consensus;
@@ -74,7 +75,7 @@ pub(crate) fn likelihood(minimum: &Minimum, plugged: Option<&PluginCovariances>)
     Likelihood {
         motion: minimum.motion,
         covariance: plugged.map_or(UNKNOWN, |plugged| nested(&plugged.likelihood)),
-        tangent: axes(&minimum.tangent),
+        tangent: nested(&minimum.tangent),
         cost: minimum.equations.cost,
     }
 }
@@ -87,7 +88,7 @@ pub(crate) fn set_motion(
     covariance: Option<&Matrix5>,
     here: &Equations,
 ) {
-    (out.motion, out.tangent) = (*motion, axes(tangent));
+    (out.motion, out.tangent) = (*motion, nested(tangent));
     if let Some(covariance) = covariance {
         out.covariance = nested(covariance);
         out.direction_std = direction_deviation(covariance);
@@ -98,9 +99,8 @@ pub(crate) fn set_motion(
     }
 }
 
-/// Times to contact with their standard deviations, by first order from those of the depth (the smoothed one
-/// where there is any, else the point's own) and of the motion; and the rate of approach of all inliers
-/// together.
+/// Times to contact with their standard deviations, by first order from the depth (smoothed where possible)
+/// and the motion; and the rate of approach of all inliers together.
 fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations, seen: &Depths, solution: &Solution) {
     let rates = Rates::new(&out.uncertain());
     let half_way = half_way(inliers, &solution.motion);
@@ -147,8 +147,8 @@ pub(crate) fn rotation_report(
     let widened = |rotation: &RotationOnly| {
         let moved = rotation_shift(inliers, &rotation.covariance) * to_plane(flow.camera());
         let RotationOnly { rotation, covariance, .. } = rotation;
-        let length = options.correlation_length.filter(|length| *length > 0.0);
-        let own = length
+        let own = options
+            .correlation()
             .map_or(*covariance, |length| correlated_rotation_covariance(covariance, inliers, rotation, flow, length));
         own + options.systematic_errors().added_to_rotation(rotation, &moved)
     };
@@ -200,8 +200,8 @@ pub(crate) fn report_rotation(
     }
 }
 
-/// Points that decide alone make a motion doubtful that nothing worse is said against; and that there is
-/// none, or too little of one, is not known of few points which may have outliers.
+/// Reports few points where some of high leverage decide alone, or where a rotation alone or low
+/// signal-to-noise ratio may be due to outliers.
 pub(crate) fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensus) -> MotionEstimate {
     let unlikely = |shorter: f64| shorter <= 0.0;
     let few = match found.status {
@@ -217,13 +217,10 @@ pub(crate) fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensu
     if few { MotionEstimate { status: Status::FewPoints, ..found } } else { found }
 }
 
-/// What a covariance that is a multiple of an estimated variance is to be multiplied with: of errors in units
-/// of that, which have Student's distribution with `f` degrees of freedom, the variance is `f / (f - 2)` (W.
-/// Gosset 1908).
-///
-/// Truncated residuals determine the variance less well than all would.
+/// Factor `f / (f - 2)` of a covariance in units of an estimated variance: the variance of Student's
+/// distribution with `f` degrees of freedom (W. Gosset 1908). Truncated residuals (`cut`) have fewer.
 pub(crate) fn of_estimated_noise(points: usize, cut: bool) -> f64 {
-    let free = points.saturating_sub(5) as f64 * if cut { robust::CUT_INFORMATION } else { 1.0 };
+    let free = points.saturating_sub(5) as f64 * if cut { TRUNCATED_INFORMATION } else { 1.0 };
     let free = free.max(2.0 * 2.0);
     free / (free - 2.0)
 }

@@ -1,10 +1,9 @@
-//! Rotations: flow that one alone explains, so that there is no translation to estimate, and what is known of
-//! one beforehand.
+//! Flow that a rotation alone explains, and contradictions with a known rotation.
 //!
-//! A rotation `w0` of information `L` beside flow whose information about `(psi, w)` is `D` leads to `w`,
-//! from which both pull with the same force `g = L (w0 - w)`. The flow alone would lead to a motion that is
-//! away by `D^-1 g`, and to a rotation that is `d = (L^-1 + (D^-1)_ww) g` from `w0`. Where both are right,
-//! `d` has the covariance `L^-1 + C_ww` with that of the flow alone.
+//! A known rotation `w0` of information `L` and flow of information `D` about `(psi, w)` pull the estimate
+//! `w` with the same force `g = L (w0 - w)`. The flow alone has a motion that is away by `D^-1 g`, and a
+//! rotation that is `d = (L^-1 + (D^-1)_ww) g` from `w0`, whose covariance is `L^-1 + C_ww` if both are
+//! right.
 
 use crate::math::by_chance;
 use crate::motion3d::kernels::{add_to_rotation, equations};
@@ -115,12 +114,10 @@ pub(crate) fn explained_by_rotation_in_unknown_noise(observations: &Observations
     (none || (left / sigma2).ln() > -SEARCHED / n.sqrt() - FEW_POINTS / n).then_some(rotation)
 }
 
-/// By how much the flow alone would lead to another motion, along `(psi, w)`; `None` where chance explains
-/// it, or where the flow alone does not determine a motion.
-///
-/// `information`: of the flow and of the known rotation together. The motion's covariance is `own`, in which
-/// errors that the information takes for independent may go together, times `wider`, and what all flow has in
-/// `common`.
+/// Difference `(psi, w)` to the motion of the flow alone; `None` where chance explains it, or where the flow
+/// alone does not determine a motion. `information`: of the flow and of the known rotation together. The
+/// motion's covariance is `own` (with correlated errors) times `wider`, plus that of systematic errors
+/// (`common`).
 pub(crate) fn contradiction(
     known: &KnownRotation,
     w: &Vector3<f64>,
@@ -139,7 +136,7 @@ pub(crate) fn contradiction(
     // Of both only the flow's noise may be larger than given.
     let spread = own * wider + freed * common * freed.transpose();
     let expected = before + spread.fixed_view::<3, 3>(2, 2);
-    let expected = 0.5 * (expected + expected.transpose());
+    let expected = expected.symmetric_part();
     let square = apart.dot(&expected.cholesky()?.solve(&apart));
     (!by_chance(square, 3.0)).then(|| alone.fixed_columns::<3>(2) * force)
 }

@@ -7,7 +7,7 @@ use crate::motion3d::kernels::{depths, equations, information, slopes};
 use crate::motion3d::model::input::{Flow, to_plane};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::options::CommonErrors;
+use crate::motion3d::model::options::MotionOptions;
 use crate::motion3d::model::result::{Alternative, CommonEffect, Moved, Status};
 use crate::motion3d::model::rows::Matrix5;
 use crate::motion3d::robust::{Consensus, weighted_by_posterior};
@@ -52,7 +52,7 @@ impl Solution {
         improved: Option<Efficient>,
         wanted: bool,
     ) -> Self {
-        let plain = Self {
+        let mut out = Self {
             motion: minimum.motion,
             tangent: minimum.tangent,
             covariance: plugged.as_ref().map(|plugged| plugged.likelihood),
@@ -67,18 +67,15 @@ impl Solution {
             variance: None,
             fell_back: wanted && improved.is_none(),
         };
-        match improved {
-            Some(improved) if wanted => Self {
-                motion: improved.motion,
-                tangent: improved.tangent,
-                covariance: Some(improved.covariance),
-                smooth: Some(improved.smooth),
-                variance: improved.variance,
-                ..plain
-            },
-            Some(improved) => Self { covariance: Some(nonlinearity_covariance(&minimum, &improved)), ..plain },
-            None => plain,
+        if let Some(better) = improved {
+            if wanted {
+                (out.motion, out.tangent, out.covariance) = (better.motion, better.tangent, Some(better.covariance));
+                (out.smooth, out.variance) = (Some(better.smooth), better.variance);
+            } else {
+                out.covariance = Some(nonlinearity_covariance(&minimum, &better));
+            }
         }
+        out
     }
 
     /// Takes into account that some of the inliers are so by chance. Where depths are `given` for the
@@ -91,29 +88,22 @@ impl Solution {
         (self.motion, self.tangent, self.covariance) = (motion, tangent, Some(grown));
     }
 
-    /// Takes errors into the covariance that go together over a length, in the unit of the points.
-    pub fn add_correlation(&mut self, inliers: &Observations, flow: &Flow<'_>, length: Option<f64>) {
-        let (Some(covariance), Some(length)) = (self.covariance, length) else { return };
-        let nu = self.weights(inliers);
+    /// Inflates the covariance: by correlated errors, by the factor `wider` and by systematic errors. Where
+    /// the flow contradicts a known rotation it also reaches the motion of the flow alone.
+    pub fn inflate(&mut self, inliers: &Observations, flow: &Flow<'_>, options: &MotionOptions, wider: f64) {
+        let Some(independent) = self.covariance else { return };
+        let nu = self.smooth.as_deref().map_or_else(|| Cow::Owned(depths(inliers, &self.motion).nu), Cow::Borrowed);
         let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
-        self.covariance = correlated_covariance(&covariance, inliers, &at, flow, length);
-    }
-
-    /// What errors do that all flow has in common.
-    pub fn systematic_effect(&self, inliers: &Observations, flow: &Flow<'_>, common: &CommonErrors) -> CommonEffect {
-        let Some(covariance) = self.covariance else { return CommonEffect::default() };
-        let nu = self.weights(inliers);
-        let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
-        let moved = if common.offset > 0.0 { moved(inliers, &at) } else { Moved::zeros() };
-        common.on(&covariance, &self.motion, inliers.prior.as_ref(), (&moved, &to_plane(flow.camera())))
-    }
-
-    /// Has in its covariance, multiplied by `wider`, what errors do that all flow has in common. Where the
-    /// flow contradicts what is known beforehand of the rotation it reaches as far as the motion of the flow
-    /// alone.
-    pub fn inflate(&mut self, inliers: &Observations, wider: f64, common: CommonEffect) {
-        self.common = common;
-        let (Some(own), common) = (self.covariance, common.added()) else { return };
+        let errors = options.systematic_errors();
+        let moved = if errors.offset > 0.0 { moved(inliers, &at) } else { Moved::zeros() };
+        let displaced = (&moved, &to_plane(flow.camera()));
+        let effect = errors.on(&independent, &self.motion, inliers.prior.as_ref(), displaced);
+        let own = match options.correlation() {
+            Some(length) => correlated_covariance(&independent, inliers, &at, flow, length),
+            None => Some(independent),
+        };
+        (self.common, self.covariance) = (effect, own);
+        let (Some(own), common) = (own, effect.added()) else { return };
         let mut covariance = own * wider + common;
         if let Some(known) = &inliers.prior {
             let precision = if let Some(nu) = &self.smooth {
@@ -128,12 +118,6 @@ impl Solution {
             }
         }
         self.covariance = Some(covariance);
-    }
-
-    /// The depths in the weights, as long as the planes.
-    fn weights(&self, inliers: &Observations) -> Cow<'_, [f64]> {
-        let own = || Cow::Owned(depths(inliers, &self.motion).nu);
-        self.smooth.as_deref().map_or_else(own, Cow::Borrowed)
     }
 }
 

@@ -1,11 +1,10 @@
-//! How far a motion can be trusted: its status, and which directions explain the flow as well as the estimate
-//! does.
+//! The status of a motion, and which directions explain the flow as well as the estimate does.
 //!
-//! Two directions leave different components of the noise as residuals: across lines that are turned by `phi`
-//! against each other, the difference of `J` has the variance `4 sum sin^2 phi` in any case. Where depths
-//! are mostly noise, that hides the truth behind a lower minimum. Two quantities do not fluctuate so:
-//! the estimating equation, which at the true direction is zero but for the noise of its own few unknowns,
-//! however wrong its weights; and the depth map, which a wrong motion makes rough.
+//! Residuals of two directions are different components of the noise: with epipolar lines at an angle `phi`
+//! to each other the difference of `J` has the variance `4 sum sin^2 phi`. Where depths are mostly noise that
+//! can hide the truth behind a lower minimum. Two quantities fluctuate less: the estimating equation, which
+//! is zero at the true direction but for the noise of its few unknowns, and the depth map, which a wrong
+//! motion makes rough.
 
 use super::planar_twin::planar_twin;
 use super::solution::Solution;
@@ -40,10 +39,6 @@ const SPACING: f64 = 4.0;
 /// exclude.
 const CONSISTENT: f64 = 3.0;
 
-/// How many times the estimate's own standard deviation that of maximum likelihood may count: where it is
-/// larger still, other directions are what is looked for.
-const MAX_LIKELIHOOD_RATIO: f64 = 1.5;
-
 /// Squared depths behind the camera, in units of their standard deviation, that exclude the other motion of a
 /// plane.
 const EXCLUDED: f64 = 25.0;
@@ -69,7 +64,6 @@ pub(crate) fn judge(
     let found = competing.iter().copied().chain(solution.undecided).chain(turned).chain(twin);
     let same = if deviation.is_finite() { deviation.max(SAME) } else { SAME };
     solution.alternatives = different(found.chain(solution.alternatives.drain(..)), same);
-    let of_likelihood = solution.plugged.as_ref().map_or(0.0, |plugged| direction_deviation(&plugged.likelihood));
     let motions = [solution.motion, solution.minimum.motion];
     let here = equations(inliers, &solution.motion, &solution.tangent, None);
     solution.status = if inliers.n < FEW {
@@ -86,7 +80,7 @@ pub(crate) fn judge(
     } else if !solution.described
         || deviation.is_nan()
         || deviation > WIDE
-        || far(inliers, &motions, deviation, of_likelihood, rng.stream(1))
+        || far(inliers, &motions, deviation, rng.stream(1))
     {
         Status::IllConditioned
     } else if turned.is_some() || solution.undecided.is_some() {
@@ -154,16 +148,12 @@ struct TestedDirection {
     angle: f64,
 }
 
-/// Whether any direction of the half sphere that is farther than the covariance has it explains the flow of
-/// as many points as a search begins with as well as the best of the `motions`, the estimate and maximum
-/// likelihood's, depth signs included: where the cost along a line of directions is curved, the covariance at
-/// the minimum is too small.
-///
-/// `own` and `likelihood`: standard deviations of both, degrees (0: not known); of the points that the search
-/// sees they are that much larger.
-fn far(observations: &Observations, motions: &[Motion], own: f64, likelihood: f64, rng: CounterRng) -> bool {
+/// Whether any direction farther than the covariance has it explains the flow of at most [`MANY`] points as
+/// well as the best of the `motions` (the estimate and maximum likelihood's), depth signs included. `own`:
+/// standard deviation of the estimate, degrees.
+fn far(observations: &Observations, motions: &[Motion], own: f64, rng: CounterRng) -> bool {
     let fewer = (observations.n as f64 / observations.n.min(MANY) as f64).sqrt();
-    let beyond = FAR * own.max(likelihood.min(MAX_LIKELIHOOD_RATIO * own)) * fewer + SPACING;
+    let beyond = FAR * own * fewer + SPACING;
     let beyond_by_chance = CONSISTENT * own * fewer + SPACING;
     let searched = &*at_most(observations, MANY, rng);
     let first = motions[0].u();

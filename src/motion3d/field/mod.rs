@@ -8,17 +8,16 @@ mod patches;
 pub use patches::{FieldPatches, field_patches};
 
 use super::estimate::estimate_motion;
-use super::model::input::{Flow, Noise, check_field};
+use super::model::input::{Flow, Noise, check_field, measurement};
 use super::model::options::{CommonErrors, MotionOptions};
 use super::model::result::MotionEstimate;
 use super::patches::estimate_patch_motion;
 use crate::error::{Error, Result};
 use crate::math::{Real, median, quantile};
-use crate::types::{FlowField, Intrinsics, Rect, SamplingGrid, Status};
+use crate::types::{FlowField, Intrinsics, Rect, SamplingGrid};
 use nalgebra::{Matrix2, Vector2};
 
-/// Standard deviation of the flow's common displacement, in those of one point: in rendered rooms, by both
-/// methods with a field of windows, mean errors of a picture are 0.2 to 0.4 of it
+/// Standard deviation of the flow's common displacement, in those of one point: 0.2 to 0.4 in rendered rooms
 /// (`benchmarks/tables/motion3d_fields.py --only errors`).
 const BIAS_PER_NOISE: f64 = 0.4;
 
@@ -28,8 +27,8 @@ const SHARPEST_SHARE: f64 = 0.25;
 /// About so many sites of a field are used for its common errors.
 const COMMON_ERROR_SITES: f64 = 4000.0;
 
-/// Distance in correlation lengths from which on errors share no window. On a recorded drive a fifth of them
-/// is still correlated (`benchmarks/tables/motion3d_drive.py`); the motion's covariance sums that.
+/// Distance in correlation lengths from which on errors share no window; the motion's covariance sums what is
+/// correlated farther (`benchmarks/tables/motion3d_drive.py`).
 const INDEPENDENT: f64 = 4.0;
 
 /// Default spacing in correlation lengths, and the least, px: of farther points there are fewer, closer ones
@@ -126,12 +125,9 @@ pub fn estimate_field_motion<T: Real>(
 
 /// Takes every so manieth valid estimate of a field.
 ///
-/// Windowed estimates share pixels, and where they do their errors go together over the correlation length
-/// `l`, as `exp(-d^2 / (4 l^2))`: taken for independent, close points would make the motion's covariance too
-/// small. Closer than 4 `l` they get their covariance times `4 pi l^2 / spacing^2`, the number of points on
-/// the area over which errors are one. What goes together farther than that is for
-/// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions).
-///
+/// Errors of windowed estimates correlate over the length `l`, as `exp(-d^2 / (4 l^2))`. Points closer than 4
+/// `l` get their covariance times `4 pi l^2 / spacing^2`, the number of points on the area over which errors
+/// are one; farther correlation is for [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions).
 /// A list of points is taken whole.
 ///
 /// # Errors
@@ -195,15 +191,6 @@ fn site_pixels<T>(field: &FlowField<T>, step: usize) -> impl Iterator<Item = (us
 /// Whether a pixel lies in the region, which is everything where there is none.
 fn is_within(region: Option<Rect>, (x, y): (usize, usize)) -> bool {
     region.is_none_or(|r| (r.x..r.x + r.width).contains(&x) && (r.y..r.y + r.height).contains(&y))
-}
-
-/// The flow and its covariance at a site, if they are valid.
-fn measurement<T: Real>(field: &FlowField<T>, site: usize) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-    let valid = field.status[site].is_valid() && field.status[site] != Status::Inconsistent;
-    let [[uu, uv, ..], [vu, vv, ..], ..] = field.covariance_at(site).filter(|_| valid)?;
-    let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
-    let uv = 0.5 * (uv + vu);
-    Some((Vector2::new(u, v), Matrix2::new(uu, uv, uv, vv)))
 }
 
 /// Common errors of a whole field: an object that moves little in the picture does not determine the scale

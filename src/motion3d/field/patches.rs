@@ -4,11 +4,11 @@ use super::{common_errors, is_within, site_pixels};
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::motion3d::diagnostics::correlated_noise::area;
-use crate::motion3d::model::input::check_field;
+use crate::motion3d::model::input::{check_field, is_usable};
 use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::patches::AffinePatches;
 use crate::parallel::Threads;
-use crate::types::{FieldLayout, FlowField, Intrinsics, MOTION_NAMES, Rect, SamplingGrid, Status};
+use crate::types::{FieldLayout, FlowField, Intrinsics, MOTION_NAMES, Rect, SamplingGrid};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 use rayon::prelude::*;
 
@@ -45,12 +45,10 @@ impl FieldPatches {
 /// covariances: its six numbers at the middle. What bends would shift those of an affine flow by more than
 /// their noise. Windows of which less than half is valid are left out.
 ///
-/// Pixels whose windows overlap share their noise. The covariance of a patch is that of independent pixels
-/// times the number of its pixels over the number of disjoint windows in it, those of the area `58 l^2` over
-/// which errors of the correlation length `l` are one, their tail beyond the windows included (see
-/// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions)). Flow that is not affine in a
-/// window, as over an edge in depth, shows in residuals that are larger than the pixels' covariances allow:
-/// by as much that of the patch grows.
+/// The covariance of a patch is that of independent pixels times the number of pixels on the area `58 l^2`
+/// over which errors of the correlation length `l` are one (see
+/// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions)), and grows by as much as residuals
+/// are larger than the pixels' covariances allow, as over an edge in depth.
 ///
 /// # Errors
 /// [`Error::Argument`] naming `field` for one without covariance, without a Jacobian or with a pixel pitch,
@@ -116,8 +114,7 @@ impl Windows {
     fn pixels_of_windows<T: Real>(&self, field: &FlowField<T>, region: Option<Rect>) -> Vec<Vec<usize>> {
         let mut out = vec![Vec::new(); self.columns * self.rows];
         for (site, at) in site_pixels(field, 1).filter(|(_, at)| is_within(region, *at)) {
-            let valid = field.status[site].is_valid() && field.status[site] != Status::Inconsistent;
-            if let Some(window) = self.of(at).filter(|_| valid) {
+            if let Some(window) = self.of(at).filter(|_| is_usable(field, site)) {
                 out[window].push(site);
             }
         }
@@ -195,7 +192,7 @@ impl Sums {
         let misfit = if freedom > 0 { (rest / freedom as f64).max(1.0) } else { 1.0 };
         let covariance = factor.inverse().fixed_view::<6, 6>(0, 0).into_owned();
         let six = motion.fixed_rows::<6>(0).into_owned();
-        misfit.is_finite().then(|| (six, 0.5 * (covariance + covariance.transpose()), misfit))
+        misfit.is_finite().then(|| (six, covariance.symmetric_part(), misfit))
     }
 }
 

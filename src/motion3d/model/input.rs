@@ -3,8 +3,9 @@
 
 use super::rows::tangents;
 use crate::error::{Error, Result, numbers};
-use crate::types::{FlowField, Intrinsics};
-use nalgebra::{Matrix2, Matrix6, SMatrix, Vector3};
+use crate::math::Real;
+use crate::types::{FlowField, Intrinsics, Status};
+use nalgebra::{Matrix2, Matrix6, SMatrix, Vector2, Vector3};
 
 /// Points with their flow, N of each.
 #[derive(Debug, Clone, Copy)]
@@ -159,6 +160,19 @@ pub(crate) fn check_field<T>(field: &FlowField<T>) -> Result<()> {
         return Err(Error::argument("field", "flow in px", got));
     }
     Ok(())
+}
+
+/// Whether a site of a field is usable.
+pub(crate) fn is_usable<T>(field: &FlowField<T>, site: usize) -> bool {
+    field.status[site].is_valid() && field.status[site] != Status::Inconsistent
+}
+
+/// The flow and its covariance at a usable site.
+pub(crate) fn measurement<T: Real>(field: &FlowField<T>, site: usize) -> Option<(Vector2<f64>, Matrix2<f64>)> {
+    let [[uu, uv, ..], [vu, vv, ..], ..] = field.covariance_at(site).filter(|_| is_usable(field, site))?;
+    let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
+    let uv = 0.5 * (uv + vu);
+    Some((Vector2::new(u, v), Matrix2::new(uu, uv, uv, vv)))
 }
 
 /// What maps flow to the plane at distance 1, where it lies already without a camera.

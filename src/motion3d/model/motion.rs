@@ -1,6 +1,6 @@
 //! A rigid motion: the flow it makes, its finite displacement, its essential matrix.
 
-use super::rows::{AffineRows, Derotation, Rows, Vector5, cross_matrix};
+use super::rows::{AffineRows, Derotation, Rows, Vector5, nested};
 use crate::types::Intrinsics;
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 
@@ -103,8 +103,7 @@ impl Motion {
 
     /// The rotation matrix of the whole frame, `exp([w]x)`, row by row.
     pub fn rotation_matrix(&self) -> [[f64; 3]; 3] {
-        let matrix = *nalgebra::Rotation3::new(self.w()).matrix();
-        std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
+        nested(nalgebra::Rotation3::new(self.w()).matrix())
     }
 
     /// The displacement of the whole frame in units of the path's length: `t`, so that `X' = Rot X + t / nu`
@@ -116,8 +115,6 @@ impl Motion {
     /// The essential matrix `[t]x Rot` of the frame, row by row: `eta'^t E eta = 0` for the two views'
     /// points.
     pub fn essential_matrix(&self) -> [[f64; 3]; 3] {
-        let rotation = *nalgebra::Rotation3::new(self.w()).matrix();
-        let matrix = cross_matrix(&Vector3::from(self.displacement())) * rotation;
-        std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
+        nested(&(Vector3::from(self.displacement()).cross_matrix() * nalgebra::Rotation3::new(self.w()).matrix()))
     }
 }

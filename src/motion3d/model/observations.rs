@@ -23,9 +23,8 @@ pub(crate) const PLANES: usize = 14;
 /// Residuals below this share of the flow are rounding.
 pub(crate) const ROUNDING: f64 = 1e-11;
 
-/// Ratios of a point's standard deviations along its two axes at which minima are looked for one after the
-/// other, where the points' own are larger: the smaller a point's noise along one axis, the narrower
-/// the minimum.
+/// Ratios of a point's standard deviations along its axes at which minima are found one after the other: the
+/// smaller the noise along one axis, the narrower the minimum.
 const RATIOS: [f64; 3] = [6.0, 24.0, 96.0];
 
 /// By how much residuals may grow from one of these to the next.
@@ -46,11 +45,11 @@ pub(crate) struct Observations {
     pub n: usize,
     pub stride: usize,
     planes: Vec<f64>,
-    /// Where the rows are those of: `(x, y, 0)` on the plane, the bearing on the sphere. Half way along a
-    /// displacement this has half of the flow's noise in it.
+    /// Where the rows belong: `(x, y, 0)` on the plane (half way along a displacement with half of the flow's
+    /// noise), the bearing on the sphere.
     pub position: Vec<[f64; 3]>,
-    /// Where the points were given, in the same axes, for neighbourhoods and what is predicted from them:
-    /// free of the flow's noise, so that a prediction is independent of the point's residual.
+    /// Where the points were given, free of the flow's noise: predictions from neighbourhoods are independent
+    /// of a point's residual.
     pub site: Vec<[f64; 3]>,
     /// Whether positions and sites are bearings.
     pub spherical: bool,
@@ -188,8 +187,7 @@ impl Observations {
         out
     }
 
-    /// How many times as large the noise of point `k` is along one axis as along the other, and the axis with
-    /// little of it.
+    /// Ratio of the noise of point `k` along both axes, and the axis with little of it.
     fn stretch(&self, k: usize) -> (f64, Vector2<f64>) {
         let g = self.row(k).g;
         // Rows of whitened points are stretched along the axis with little noise.
@@ -199,16 +197,14 @@ impl Observations {
         (stretch, eigen.eigenvectors.column(most).into_owned())
     }
 
-    /// How many times as large noise is along one axis as along the other, of all but a tenth of the points
-    /// at most, by a thousand of them.
+    /// The 0.9 quantile of the ratio of noise along both axes, from a thousand points.
     pub fn longest(&self) -> f64 {
         let few = (0..self.n).step_by(self.n.div_ceil(1000).max(1));
         let mut stretches: Vec<f64> = few.map(|k| self.stretch(k).0).collect();
         quantile(&mut stretches, 0.9).unwrap_or(0.0)
     }
 
-    /// The same points where no point's noise is more than `ratio` times as large along one axis as along the
-    /// other: the smaller standard deviation is taken to be larger.
+    /// The same points with the smaller standard deviation of each raised to the larger over `ratio`.
     fn rounded(&self, ratio: f64) -> Self {
         let mut out = self.clone();
         for k in 0..self.n {

@@ -77,10 +77,9 @@ pub struct MotionOptions {
     /// so that together they count once. What is an outlier, and what chance explains, is judged by their
     /// own. Default: 1.
     pub points_per_independent_sample: Option<f64>,
-    /// How far errors of neighbours go together, in the unit of the points (px with a camera, rad on the
-    /// sphere), as those of windowed flow do: the covariance is then that of the sums over points whose
-    /// errors correlate (`together`), in no direction smaller than that of independent points. Default: not
-    /// at all.
+    /// Correlation length of the errors of neighbours, in the unit of the points (px with a camera, rad on
+    /// the sphere), as windowed flow has: the covariance is in no direction smaller than that of independent
+    /// points. Default: 0.
     pub correlation_length: Option<f64>,
     /// Standard deviation of a factor, about 1, that all flow is too long by, as flow from gradients is: no
     /// residual shows it, and it is one of the rotation's length. From 0 to 1; default: 0.
@@ -98,6 +97,11 @@ impl MotionOptions {
     /// Errors that all flow has in common.
     pub(crate) fn systematic_errors(&self) -> CommonErrors {
         CommonErrors { scale: self.flow_scale_std.unwrap_or(0.0), offset: self.flow_bias_std.unwrap_or(0.0) }
+    }
+
+    /// How far errors correlate, where they do.
+    pub(crate) fn correlation(&self) -> Option<f64> {
+        self.correlation_length.filter(|length| *length > 0.0)
     }
 
     /// The same options with these common errors where none are given.

@@ -1,7 +1,7 @@
 //! The result of an estimate.
 
 use super::motion::Motion;
-use super::rows::{Matrix5, Vector5};
+use super::rows::{Matrix5, Vector5, nested};
 use crate::types::Intrinsics;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, RowVector2, SMatrix, SVector, Vector2};
 
@@ -123,15 +123,6 @@ pub struct MotionEstimate {
 
 pub(crate) const UNKNOWN: [[f64; 5]; 5] = [[f64::NAN; 5]; 5];
 
-/// The axes of `psi`, row by row.
-pub(crate) fn axes(tangent: &Matrix2x3<f64>) -> [[f64; 3]; 2] {
-    std::array::from_fn(|i| std::array::from_fn(|j| tangent[(i, j)]))
-}
-
-pub(crate) fn nested(matrix: &Matrix5) -> [[f64; 5]; 5] {
-    std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
-}
-
 impl MotionEstimate {
     /// The motion as [`contact_map`](crate::motion3d::contact_map) takes it.
     pub fn uncertain(&self) -> UncertainMotion {
@@ -190,7 +181,7 @@ pub fn focus_of_expansion(
     let block = Matrix2::from_fn(|i, j| covariance[i][j]);
     let of_focus = slope * block * slope.transpose();
     let at = camera.map_or(at, |camera| camera.to_pixel(at));
-    Some((at, std::array::from_fn(|i| std::array::from_fn(|j| of_focus[(i, j)]))))
+    Some((at, nested(&of_focus)))
 }
 
 /// What one displacement of all flow, on the plane at distance 1, does to the equations' unknowns.

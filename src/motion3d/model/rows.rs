@@ -21,8 +21,9 @@ pub(crate) struct Rows {
     pub r: Matrix2x3<f64>,
 }
 
-pub(crate) fn cross_matrix(a: &Vector3<f64>) -> Matrix3<f64> {
-    Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
+/// A matrix row by row.
+pub(crate) fn nested<const R: usize, const C: usize>(matrix: &SMatrix<f64, R, C>) -> [[f64; C]; R] {
+    matrix.transpose().into()
 }
 
 /// Two unit vectors `e1`, `e2` with `e1 x e2 = direction` (of length 1), as rows; the same for the same
@@ -57,7 +58,7 @@ impl Rows {
     /// -G [eta]x`.
     pub fn sphere(eta: &Vector3<f64>) -> Self {
         let g = tangents(eta);
-        Self { g, r: -g * cross_matrix(eta) }
+        Self { g, r: -g * eta.cross_matrix() }
     }
 }
 
@@ -160,7 +161,7 @@ impl Derotation {
             let half = 0.5 * a;
             ((1.0 - half.sin() / half) / square, 2.0 * ((0.5 * half).sin() / a).powi(2))
         };
-        let cross = cross_matrix(rotation);
+        let cross = rotation.cross_matrix();
         Self {
             rotation: *rotation,
             half: *Rotation3::new(0.5 * rotation).matrix(),
@@ -178,11 +179,8 @@ impl Derotation {
     }
 
     /// The rows of `w` for a displacement `left` from `from` with the rows `g` of `u`: at its middle, times
-    /// `(Z_1' + Z_2') / (2 Z_2') = 1 - nu t_z / 2`, by which its depth changes them.
-    ///
-    /// Of the displacement only what lies along the epipolar line of the direction that is known counts: what
-    /// is across is the noise of the residual, and rows that go with it would not leave the sum of their
-    /// products zero. Depths that noise has change the rows rather by less than by far too much.
+    /// `(Z_1' + Z_2') / (2 Z_2') = 1 - nu t_z / 2`. Only the part along the known epipolar line counts: the
+    /// part across is the residual's noise, which may not correlate with the rows.
     fn rotation_rows(&self, from: &Vector2<f64>, g: &Matrix2x3<f64>, left: &Vector2<f64>) -> Matrix2x3<f64> {
         let t = g * self.towards;
         let square = t.norm_squared();

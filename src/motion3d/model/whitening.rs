@@ -113,16 +113,12 @@ pub(crate) fn plane_row(
         let at = at(if placement == Placement::Midpoint { 0.5 } else { 0.0 });
         (Rows::plane(at), scale * Vector2::from(flow), at)
     };
-    let row = Row::whitened(&rows, flow, &symmetric(scale * covariance * scale.transpose()))?;
+    let row = Row::whitened(&rows, flow, &(scale * covariance * scale.transpose()).symmetric_part())?;
     (x.is_finite() && y.is_finite()).then_some((row, [x, y, 0.0]))
 }
 
-fn symmetric<const N: usize>(matrix: SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
-    (matrix + matrix.transpose()) * 0.5
-}
-
-/// Symmetric covariances, each number's in its own unit. One that would be a thousand times as precise as the
-/// better quarter is no measurement's: the variances of that quarter are added.
+/// Symmetric covariances. One that is a thousand times as precise as the better quarter is no measurement's:
+/// the variances of that quarter are added.
 pub(crate) fn floored<const N: usize>(mut covariances: Vec<SMatrix<f64, N, N>>) -> Vec<SMatrix<f64, N, N>> {
     let diagonal = |i: usize| {
         let mut own: Vec<f64> = covariances.iter().map(|c| c[(i, i)]).filter(|value| value.is_finite()).collect();
@@ -130,7 +126,7 @@ pub(crate) fn floored<const N: usize>(mut covariances: Vec<SMatrix<f64, N, N>>) 
     };
     let usual = SVector::<f64, N>::from_fn(|i, _| diagonal(i));
     for given in &mut covariances {
-        *given = symmetric(*given);
+        *given = given.symmetric_part();
         let excess = *given - SMatrix::from_diagonal(&(usual * 1e-6));
         if excess.iter().all(|value| value.is_finite()) && excess.cholesky().is_none() {
             *given += SMatrix::from_diagonal(&usual);

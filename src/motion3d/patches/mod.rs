@@ -24,7 +24,7 @@ use crate::motion3d::model::whitening::floored;
 use crate::motion3d::solver::covariance::{inverse, plugged};
 use crate::motion3d::solver::finite_rotation::{ROUNDING, ROUNDS};
 use crate::motion3d::solver::refine::Minimum;
-use crate::motion3d::solver::starts::{APART, STARTS, apart, evaluate, sample};
+use crate::motion3d::solver::starts::{APART, STARTS, apart, evaluate};
 use crate::types::Intrinsics;
 use nalgebra::{Matrix2, Matrix6, Vector3, Vector6};
 use report::{judge, report_motion, turning_report};
@@ -190,7 +190,7 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
 /// The minima that are reached from the best directions of the half sphere, both signs each, the cheapest
 /// first.
 fn minima(system: &System, rng: CounterRng) -> Vec<Minimum> {
-    let few = system.subset(&sample(system.patches.len(), SEARCHED, rng));
+    let few = system.subset(&rng.sample(system.patches.len(), SEARCHED));
     let found = evaluate(|u| few.best_rotation(u).map(|(w, cost)| (Motion::of(u, &w), cost)));
     let refined = apart(found, APART, STARTS).into_iter().map(|(start, _)| system.refine(&start));
     let both = refined.flat_map(|minimum| {

@@ -1,9 +1,8 @@
 //! The estimating equation with surfaces drawn to their distribution over the patches, and whether its
 //! covariance holds.
 //!
-//! The theory is linear and takes the surfaces in the weights for known. With few patches neither is so, and
-//! errors have longer tails than a covariance from one linear step has: the scene that was found is measured
-//! again with new noise and solved again (B. Efron 1979: the bootstrap).
+//! With few patches neither is the theory linear nor are the surfaces in the weights known: the scene that
+//! was found is measured again with new noise and solved again (the bootstrap, B. Efron 1979).
 
 use super::system::System;
 use crate::math::quantile;
@@ -51,7 +50,7 @@ fn posterior_means(surfaces: &[(Vector3<f64>, Matrix3<f64>)]) -> Option<Vec<Vect
         mean = posterior.iter().map(|(m, _)| m).sum::<Vector3<f64>>() / count;
         let scatter = |(m, v): &(Vector3<f64>, Matrix3<f64>)| (m - mean) * (m - mean).transpose() + v;
         spread = posterior.iter().map(scatter).sum::<Matrix3<f64>>() / count;
-        spread = 0.5 * (spread + spread.transpose());
+        spread = spread.symmetric_part();
     }
     Some(posterior.into_iter().map(|(m, _)| m).collect())
 }
@@ -70,10 +69,8 @@ pub(crate) fn shrunk(system: &System, start: &Motion) -> Option<Shrunk> {
     Some(found)
 }
 
-/// Scoring steps: the expected slope of the equation is that of its weights' own information.
-///
-/// The equation's slope for the noise at hand is another, most where the epipole lies among patches: steps
-/// that grow went too far, and from there on they are half as long.
+/// Scoring steps, with the expected slope of the equation. Where the epipole lies among patches the actual
+/// slope is another: after a step that grows they are half as long.
 fn solve(system: &System, start: &Motion, surfaces: &[Vector3<f64>]) -> Option<Motion> {
     let (mut motion, mut share, mut before) = (*start, 1.0, f64::INFINITY);
     for _ in 0..STEPS {

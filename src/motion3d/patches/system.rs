@@ -54,7 +54,7 @@ impl Patch {
         covariance: &Matrix6<f64>,
         turn: Option<&Derotation>,
     ) -> Option<Self> {
-        let symmetric = 0.5 * (covariance + covariance.transpose());
+        let symmetric = covariance.symmetric_part();
         let whiten = symmetric.cholesky()?.l().try_inverse()?;
         let rows = AffineRows::new(point);
         let mean = turn.map_or_else(Matrix3::identity, |turn| turn.mean);

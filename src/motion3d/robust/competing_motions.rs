@@ -4,8 +4,8 @@
 //! the noise. No residual shows that. But the motion of the scene is then another one, which fits all points
 //! except those of one region, and its depth map is as smooth and as far in front of the camera.
 
-use super::depth_consistency::{Cells, DepthConsistency, Judged};
-use super::outlier_posterior::{posterior, weighted};
+use super::depth_consistency::{DepthConsistency, Judged};
+use super::outlier_posterior::{ROUNDS, SETTLED, posterior, weighted};
 use super::search::{graduated, robust_motions};
 use super::two_motions::MIN_TESTED;
 use super::{APART, Candidates, INLIER, MAJORITY, cheaper_sign, inliers_of, settle, truncated};
@@ -21,7 +21,7 @@ use crate::motion3d::solver::efficient::solve;
 use crate::motion3d::solver::likelihood::cost_of;
 use crate::motion3d::solver::profile_likelihood::ROUND;
 use crate::motion3d::solver::smoothing::DepthSmoother;
-use crate::motion3d::solver::starts::{at_most, sample};
+use crate::motion3d::solver::starts::at_most;
 use rayon::prelude::*;
 
 /// Maximum number of outliers among which a second motion is searched.
@@ -42,8 +42,7 @@ pub(crate) fn among_many_outliers(
     gate: &DepthConsistency<'_>,
     candidates: &[(Motion, f64)],
 ) -> Option<(Motion, Vec<Alternative>)> {
-    let cells = Cells::new(on);
-    let own = DepthConsistency::new(on, &cells);
+    let own = DepthConsistency::new(on);
     let refined = candidates.par_iter().filter_map(|(motion, _)| {
         let (motion, cost) = refined_by_posterior(on, &own, *motion)?;
         Some((motion, cost, inliers_of(on, &motion)))
@@ -69,18 +68,13 @@ pub(crate) fn among_many_outliers(
     Some((best, competing))
 }
 
-/// Times that posteriors are updated on the way to a root, and a change of the direction, rad, that is not
-/// worth another.
-const MAX_UPDATES: usize = 8;
-const SETTLED: f64 = 1e-3;
-
 /// From a motion that was found by least squares to the root of the equation with probabilities, with
 /// updated probabilities on the way; with its cost. `None` if too few are inliers.
 ///
 /// Outliers with depths of their own, which are large, weigh most in least squares; drawn to their
 /// neighbours' they weigh as inliers do.
 fn refined_by_posterior(all: &Observations, gate: &DepthConsistency<'_>, start: Motion) -> Option<(Motion, f64)> {
-    let (mut motion, mut rounds) = (start, 0..MAX_UPDATES);
+    let (mut motion, mut rounds) = (start, 0..ROUNDS);
     loop {
         let inliers = inliers_of(all, &motion);
         let Judged { outliers, smooth, cost } = gate.judged(&motion, &inliers).filter(|_| inliers.len() >= UNKNOWNS)?;
@@ -105,7 +99,7 @@ pub(crate) fn second(observations: &Observations, best: Motion, rng: CounterRng)
         return None;
     }
     // What may be the scene is much of the rejected: few of them show it.
-    let chosen = sample(rejected.len(), REJECTED, rng.stream(8));
+    let chosen = rng.stream(8).sample(rejected.len(), REJECTED);
     let rest = observations.subset(&chosen.iter().map(|&place| rejected[place as usize]).collect::<Vec<u32>>());
     let found = robust_motions(&rest, 1, rng).pop()?;
     let found = cheaper_sign(&rest, found).0;
@@ -157,7 +151,7 @@ const STARTS: usize = 2;
 /// points.
 pub(crate) fn hidden_object(
     observations: &Observations,
-    cells: &Cells,
+    cells: &DepthConsistency<'_>,
     best: &Motion,
     candidates: &Candidates,
     rng: CounterRng,
@@ -213,7 +207,7 @@ fn of_scene(observations: &Observations, motion: Motion) -> Option<(Motion, Vec<
 }
 
 /// Whether the points that only the first motion fits lie together, as those of an object do.
-fn is_one_region(observations: &Observations, cells: &Cells, fitted: &[u32], scene: &[u32]) -> bool {
+fn is_one_region(observations: &Observations, cells: &DepthConsistency<'_>, fitted: &[u32], scene: &[u32]) -> bool {
     let is_scene = observations.mask(scene);
     let rejected = cells.rejected(&is_scene);
     let lost: Vec<f64> = fitted.iter().filter(|&&k| !is_scene[k as usize]).map(|&k| rejected[k as usize]).collect();

@@ -1,11 +1,10 @@
 //! Outliers along their epipolar line fit any motion, but not with the depth of their neighbours.
 //!
-//! A depth that differs from its neighbours' is no proof: few near objects before a far background are as
-//! rare, and carry all of the translation. Their number decides: of outliers spread evenly, as many fit a
-//! motion with such a depth as miss its epipolar line by a little more and have the same depth. Points with
-//! such depths are outliers if that many explain them (the local false discovery rate; B. Efron 2001).
+//! A depth that differs from its neighbours' is no proof, as few near objects before a far background are as
+//! rare. The number decides: of outliers spread evenly, as many fit a motion with such a depth as miss its
+//! epipolar line by a little more (the local false discovery rate; B. Efron 2001).
 
-use super::outlier_posterior::{BAND, Bin, DOUBLING, OutlierPosterior};
+use super::outlier_posterior::{BAND, DOUBLING, OutlierPosterior};
 use super::{Consensus, INLIER};
 use crate::math::kd_tree::Tree;
 use crate::math::{median, quantile};
@@ -17,8 +16,8 @@ use std::ops::Range;
 /// Neighbours that a depth is compared with, and whose share of rejected ones is looked at.
 const NEAREST: usize = 16;
 
-/// The share of the differences whose quantile measures them, and that quantile of a standard normal's size:
-/// high enough for two layers of depth to stay.
+/// Quantile of the differences that measures them, high enough for two layers of depth to stay; that of a
+/// standard normal's size.
 const SHARE: f64 = 0.85;
 const SHARE_DEVIATION: f64 = 1.44;
 
@@ -32,16 +31,25 @@ pub(crate) struct Judged {
     pub cost: f64,
 }
 
-/// Rejects depths that disagree with their neighbours'.
+/// Number of cells: an object on a tenth of the picture fills one.
+const CELLS: usize = 16;
+/// Bounds of the largest number of points of a cell: the median depth of fewer is too noisy, and more are not
+/// needed.
+const CELL_POINTS: [usize; 2] = [32, 64];
+
+/// Rejects depths that disagree with those of the inliers in the same cell of the picture.
 pub(crate) struct DepthConsistency<'a> {
     observations: &'a Observations,
-    cells: &'a Cells,
+    tree: Tree,
+    cells: Vec<Range<usize>>,
 }
 
 impl<'a> DepthConsistency<'a> {
-    /// For these points, of which these are the neighbourhoods.
-    pub fn new(observations: &'a Observations, cells: &'a Cells) -> Self {
-        Self { observations, cells }
+    /// For these points.
+    pub fn new(observations: &'a Observations) -> Self {
+        let tree = Tree::new(&observations.site[..observations.n]);
+        let cells = tree.cells(observations.n.div_ceil(CELLS).clamp(CELL_POINTS[0], CELL_POINTS[1]));
+        Self { observations, tree, cells }
     }
 
     /// The inliers without those that outliers explain, and how likely each of the others is one.
@@ -57,23 +65,13 @@ impl<'a> DepthConsistency<'a> {
         if inliers.len() <= NEAREST {
             return None;
         }
-        let seen = depths(self.observations, motion);
+        let (n, seen) = (self.observations.n, depths(self.observations, motion));
         let near = near(self.observations, &seen);
         let is_inlier = self.observations.mask(inliers);
-        let differences = within_cells(self.cells, &near, &is_inlier, &seen);
+        let differences = self.within_cells(&near, &is_inlier, &seen);
         let (deviations, scene) = deviations(&near, &differences, &is_inlier, &seen);
-        let n = self.observations.n;
-        let outliers = OutlierPosterior::new(
-            n,
-            seen.e[..n].iter().filter(|e| e.abs() >= BAND.start).count(),
-            near.iter().zip(&deviations).map(|(&k, &deviation)| Bin {
-                point: k,
-                deviation,
-                is_inlier: is_inlier[k as usize],
-                residual: seen.e[k as usize],
-            }),
-        );
-        let mut smooth = vec![0.0; self.observations.n];
+        let outliers = OutlierPosterior::new(&seen.e[..n], &near, &deviations, &is_inlier);
+        let mut smooth = vec![0.0; n];
         for ((&k, difference), deviation) in near.iter().zip(&differences).zip(&deviations) {
             let k = k as usize;
             let wide = scene * seen.s2[k];
@@ -82,6 +80,38 @@ impl<'a> DepthConsistency<'a> {
         }
         let cost = -inliers.iter().map(|&k| outliers.gain(k as usize, seen.e[k as usize])).sum::<f64>();
         Some(Judged { outliers, smooth, cost })
+    }
+
+    /// Halves of the picture, halves of these and so on with at least `least` points.
+    pub fn halves(&self, least: usize) -> Vec<&[u32]> {
+        self.tree.halves(least).into_iter().map(|places| &self.tree.order()[places]).collect()
+    }
+
+    /// The share of each point's nearest ones that are no inliers: by cells that are as small.
+    pub fn rejected(&self, is_inlier: &[bool]) -> Vec<f64> {
+        let (mut shares, order) = (vec![0.0; is_inlier.len()], self.tree.order());
+        for places in self.tree.cells(NEAREST) {
+            let members = &order[places];
+            let out = members.iter().filter(|&&k| !is_inlier[k as usize]).count();
+            for &k in members {
+                shares[k as usize] = out as f64 / members.len() as f64;
+            }
+        }
+        shares
+    }
+
+    /// Differences of depths from the median of the inliers in their cell.
+    fn within_cells(&self, near: &[u32], is_inlier: &[bool], seen: &Depths) -> Vec<f64> {
+        let mut around = vec![0.0; is_inlier.len()];
+        for cell in &self.cells {
+            let members = &self.tree.order()[cell.clone()];
+            let inliers = members.iter().map(|&k| k as usize).filter(|&k| is_inlier[k]);
+            let usual = median(&mut inliers.map(|k| seen.nu[k]).collect::<Vec<f64>>()).unwrap_or(0.0);
+            for &k in members {
+                around[k as usize] = usual;
+            }
+        }
+        near.iter().map(|&k| seen.nu[k as usize] - around[k as usize]).collect()
     }
 }
 
@@ -107,63 +137,4 @@ fn deviations(near: &[u32], differences: &[f64], is_inlier: &[bool], seen: &Dept
     let unit = |k: u32| (scene + 1.0 / seen.s2[k as usize]).sqrt().max(tau);
     let deviation = |(&k, difference): (&u32, &f64)| if known(k) { difference / unit(k) } else { 0.0 };
     (near.iter().zip(differences).map(deviation).collect(), scene)
-}
-
-/// Differences of depths from the median of the inliers in their cell.
-fn within_cells(cells: &Cells, near: &[u32], is_inlier: &[bool], seen: &Depths) -> Vec<f64> {
-    let mut around = vec![0.0; is_inlier.len()];
-    let mut depths = Vec::new();
-    for members in cells.members() {
-        depths.clear();
-        depths.extend(members.iter().map(|&k| k as usize).filter(|&k| is_inlier[k]).map(|k| seen.nu[k]));
-        let usual = median(&mut depths).unwrap_or(0.0);
-        for &k in members {
-            around[k as usize] = usual;
-        }
-    }
-    near.iter().map(|&k| seen.nu[k as usize] - around[k as usize]).collect()
-}
-
-/// Number of cells: an object on a tenth of the picture fills one.
-const CELLS: usize = 16;
-/// Bounds of the largest number of points of a cell: the median depth of fewer is too noisy, and more are not
-/// needed.
-const CELL_POINTS: [usize; 2] = [32, 64];
-
-/// All points of a picture by cells.
-pub(crate) struct Cells {
-    tree: Tree,
-    cells: Vec<Range<usize>>,
-}
-
-impl Cells {
-    /// For these points.
-    pub fn new(observations: &Observations) -> Self {
-        let tree = Tree::new(&observations.site[..observations.n]);
-        let cells = tree.cells(observations.n.div_ceil(CELLS).clamp(CELL_POINTS[0], CELL_POINTS[1]));
-        Self { tree, cells }
-    }
-
-    /// Halves of the picture, halves of these and so on with at least `least` points.
-    pub fn halves(&self, least: usize) -> Vec<&[u32]> {
-        self.tree.halves(least).into_iter().map(|places| &self.tree.order()[places]).collect()
-    }
-
-    /// The points of each cell.
-    pub fn members(&self) -> impl Iterator<Item = &[u32]> {
-        self.cells.iter().map(|cell| &self.tree.order()[cell.clone()])
-    }
-
-    /// The share of each point's nearest ones that are no inliers: by cells that are as small.
-    pub fn rejected(&self, is_inlier: &[bool]) -> Vec<f64> {
-        let (mut shares, order) = (vec![0.0; is_inlier.len()], self.tree.order());
-        for places in self.tree.cells(NEAREST) {
-            let members = &order[places];
-            let out = members.iter().filter(|&&k| !is_inlier[k as usize]).count();
-            for &k in members {
-                shares[k as usize] = out as f64 / members.len() as f64;
-            }
-        }
-        shares
-    }
 }

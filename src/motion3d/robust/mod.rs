@@ -19,6 +19,7 @@ mod two_motions;
 
 use crate::ablation::keeps;
 use crate::math::random::CounterRng;
+use crate::math::truncated_std;
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Scaled, UNKNOWNS};
@@ -28,8 +29,8 @@ use crate::motion3d::solver::finite_rotation::changes_inliers;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
 use crate::motion3d::solver::starts::{SEARCHED, STARTS, at_most};
 use competing_motions::{among_many_outliers, competing_motions, hidden_object, second};
-use depth_consistency::{Cells, DepthConsistency};
-pub(crate) use noise::{CUT_INFORMATION, has_high_leverage, larger, one_noise};
+use depth_consistency::DepthConsistency;
+pub(crate) use noise::{has_high_leverage, larger, one_noise};
 use outlier_posterior::OutlierPosterior;
 pub(crate) use outlier_posterior::weighted_by_posterior;
 use search::{graduated, robust_motions};
@@ -98,9 +99,8 @@ impl Consensus {
 /// Candidates for the motion with the most inliers, each with its truncated cost; the cheapest first.
 type Candidates = Vec<(Motion, f64)>;
 
-/// Returns the motion with the most inliers, and competing motions. Where the noise is not known it is
-/// estimated, and the points are measured in it afterwards. A rotation is taken out of displacements where
-/// that changes the inliers.
+/// Returns the motion with the most inliers, and competing motions. Points are then in units of the estimated
+/// noise, if it was unknown, and derotated where that changes the inliers.
 pub(crate) fn consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -> Option<Consensus> {
     let mut found = with_noise(whitening, scaled, rng)?;
     // Errors that go together look like other motions everywhere.
@@ -143,7 +143,7 @@ fn in_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, unknown: bool, rng: 
             if few { of_candidates(&scaled.observations, candidates.clone(), rng)?.motion } else { candidates[0].0 };
         let mut changed = false;
         if unknown {
-            let noise_std = noise::noise(&depths(&scaled.observations, &best).e[..scaled.observations.n]);
+            let noise_std = truncated_std(&depths(&scaled.observations, &best).e[..scaled.observations.n], UNKNOWNS);
             changed = (noise_std - 1.0).abs() > SETTLED_NOISE;
             scaled.take(noise_std);
         }
@@ -176,8 +176,7 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
     }
     let mut competing = competing_motions(on, &candidates);
     let mut found = settle(observations, candidates.first()?.0)?;
-    let cells = Cells::new(observations);
-    let gate = DepthConsistency::new(observations, &cells);
+    let gate = DepthConsistency::new(observations);
     for _ in 0..if keeps("motion3d.depth_gate") { DEPTH_ROUNDS } else { 0 } {
         let (kept, _) = gate.passed(&found);
         if kept.len() < UNKNOWNS || kept.len() == found.inliers.len() {
@@ -202,7 +201,8 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
         return None;
     }
     if keeps("motion3d.hidden_object") && observations.independent {
-        found.competing.extend(hidden_object(on, &Cells::new(on), &found.motion, &candidates, rng.stream(11)));
+        let on_cells = DepthConsistency::new(on);
+        found.competing.extend(hidden_object(on, &on_cells, &found.motion, &candidates, rng.stream(11)));
     }
     Some(found)
 }
@@ -226,10 +226,8 @@ fn cheaper_sign(observations: &Observations, motion: Motion) -> (Motion, f64) {
     if signs[1].1 < signs[0].1 { signs[1] } else { signs[0] }
 }
 
-/// `sum min(e^2 + [nu^ < 0] min((nu^ / sd)^2, cut^2 / 2), cut^2)`: an outlier counts once.
-///
-/// One on its epipolar line with a depth behind the camera counts half: what moves along with the camera, or
-/// overtakes it, lies on the same lines, unlike an outlier.
+/// `sum min(e^2 + [nu^ < 0] min((nu^ / sd)^2, cut^2 / 2), cut^2)`: an outlier counts once, and half if it is
+/// on its epipolar line with a depth behind the camera, as what overtakes the camera is.
 fn truncated(observations: &Observations, motion: &Motion, cut: f64) -> f64 {
     let (seen, most) = (depths(observations, motion), cut * cut);
     let behind = |k: usize| (seen.nu[k].min(0.0).powi(2) * seen.s2[k]).min(0.5 * most);

@@ -6,8 +6,8 @@
 
 use super::{Consensus, INLIER};
 use crate::ablation::keeps;
-use crate::math::median;
 use crate::math::random::CounterRng;
+use crate::math::{TRUNCATED_INFORMATION, median, truncated_std};
 use crate::motion3d::kernels::{depths, slopes};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, UNKNOWNS};
@@ -22,17 +22,6 @@ use nalgebra::Matrix2x3;
 /// First guess of unknown noise, as a share of the median flow.
 pub(crate) const FIRST_SHARE: f64 = 0.05;
 
-/// Residuals that estimate noise, in units of it; their mean square relative to the variance, for a normal
-/// distribution cut there.
-const CUT: f64 = 2.5;
-const CUT_VARIANCE: f64 = 0.911;
-
-/// The share of the information about a variance that is left to them.
-pub(crate) const CUT_INFORMATION: f64 = 0.69;
-
-/// Most steps.
-const STEPS: usize = 50;
-
 /// Standard deviations by which the noise of the inliers must exceed the given one.
 const LARGER: f64 = 4.0;
 
@@ -42,32 +31,9 @@ pub(crate) fn larger(observations: &Observations, motion: &Motion) -> f64 {
     if !observations.independent || !keeps("motion3d.larger_noise") {
         return 1.0;
     }
-    let variance = noise(&depths(observations, motion).e[..observations.n]).powi(2);
-    let chance = LARGER * (2.0 / (CUT_INFORMATION * observations.n as f64)).sqrt();
+    let variance = truncated_std(&depths(observations, motion).e[..observations.n], UNKNOWNS).powi(2);
+    let chance = LARGER * (2.0 / (TRUNCATED_INFORMATION * observations.n as f64)).sqrt();
     if variance > 1.0 + chance { variance } else { 1.0 }
-}
-
-/// The fixed point of "the root mean square of the residuals below 2.5 standard deviations, divided by that
-/// of a cut normal distribution"; the five unknowns take their share away.
-pub(crate) fn noise(residuals: &[f64]) -> f64 {
-    let mut noise_std = 1.0;
-    for _ in 0..STEPS {
-        let (mut sum, mut count) = (0.0, 0usize);
-        for e in residuals.iter().filter(|e| e.abs() < CUT * noise_std) {
-            sum += e * e;
-            count += 1;
-        }
-        if count <= UNKNOWNS || sum <= 0.0 {
-            break;
-        }
-        let next = (sum / (CUT_VARIANCE * (count - UNKNOWNS) as f64)).sqrt();
-        let settled = (next - noise_std).abs() < 1e-6 * noise_std;
-        noise_std = next;
-        if settled {
-            break;
-        }
-    }
-    noise_std
 }
 
 /// Estimates the noise of all points if all are inliers of one motion.
@@ -86,21 +52,17 @@ pub(crate) fn noise_std(whitening: &Whitening<'_>, observations: &Observations, 
 /// By how much the mean square may exceed what the median says of it.
 const TAILS: f64 = 1.5;
 
-/// Whether the lengths of two-dimensional residuals are those of one normal
-/// distribution: few of points that are many times as large as most would make their mean square larger than
-/// their median has it, which is `2 ln 2` variances where the mean is two.
+/// Whether the lengths of two-dimensional residuals are those of one normal distribution, whose squares have
+/// the mean 2 and the median `2 ln 2` variances: a few large ones raise the mean.
 pub(crate) fn one_noise(residuals: impl Iterator<Item = f64>) -> bool {
     let mut squares: Vec<f64> = residuals.map(|rest| rest * rest).collect();
     let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
     mean <= TAILS * median(&mut squares).unwrap_or(0.0) / std::f64::consts::LN_2
 }
 
-/// By how much, in nats, outliers shorten the description of the residuals: that with `noise_std`, in present
-/// units of noise, for all points, less that with the noise of the inliers and the others anywhere.
-///
-/// Lengths of descriptions (J. Rissanen 1978): `-ln` of the densities, that of an outlier uniform over the
-/// residuals' range, and `ln C(n, k)` for which points they are. A selection among few points makes residuals
-/// small that the unknowns do not account for.
+/// By how much, in nats, outliers shorten the description of the residuals (J. Rissanen 1978): from that with
+/// `noise_std`, in present units of noise, for all points to that with the noise of the inliers, outliers
+/// uniform over the residuals' range, and `ln C(n, k)` for which points these are.
 pub(crate) fn shortening(observations: &Observations, found: &Consensus, noise_std: f64) -> f64 {
     let (n, k) = (observations.n, found.inliers.len());
     if k >= n {

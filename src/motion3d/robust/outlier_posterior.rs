@@ -7,11 +7,11 @@
 //! with the probability `h phi(e) / (h phi(e) + b)`.
 //!
 //! With this probability `g(e)` the estimating equation is `sum g(e) e D(nu~)^t = 0`, solved by repeated
-//! weighting. Outliers spread evenly add nothing to its mean, and nothing to its slope: when the motion
-//! changes, so do those that fit it. So the slope is that of the inliers alone, the mean of `g e^2 D^t D` by
-//! parts. Least squares on a fixed set of points treat outliers as inliers.
+//! weighting. Outliers spread evenly add nothing to its mean or its slope, which is that of the inliers: the
+//! mean of `g e^2 D^t D` by parts. Least squares on a fixed set of points treat outliers as inliers.
 
 use super::{Consensus, INLIER};
+use crate::math::binomial_tail;
 use crate::motion3d::kernels::{depths, information};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
@@ -42,19 +42,8 @@ const MIN_ODDS: f64 = 1e-6;
 /// Bins from here on are odd enough to be left out where outliers are the most of them.
 const TAIL: usize = 4;
 
-/// How rarely, of all estimates, outliers alone may make odd depths so many: each one that is kept wrongly
-/// decides nearly alone.
+/// Probability, over all bins, that outliers alone make odd depths so many.
 const RARE: f64 = 1e-3;
-
-/// A point that is counted.
-pub(crate) struct Bin {
-    pub point: u32,
-    /// Of its depth, in units of what is usual.
-    pub deviation: f64,
-    pub is_inlier: bool,
-    /// Across the epipolar line, in units of noise.
-    pub residual: f64,
-}
 
 /// What points of one bin are.
 #[derive(Debug, Clone, Copy)]
@@ -99,20 +88,6 @@ fn relative_information(outliers: f64) -> f64 {
     (0..=STEPS).map(value).sum::<f64>() * step / WITHIN
 }
 
-/// Probability that at least `fitted` outliers fit by chance if `beside` and one unseen outlier do not:
-/// each fits with the share of the strip of inliers, `wider` times that of the band.
-fn by_chance(fitted: usize, beside: usize, wider: f64) -> f64 {
-    let (n, p) = (fitted + beside + 1, wider / (1.0 + wider));
-    // Terms of the binomial distribution, from all of them down to none of the others.
-    let mut term = n as f64 * p.ln();
-    let mut sum = 0.0;
-    for missing in 0..=beside + 1 {
-        sum += term.exp();
-        term += ((n - missing) as f64 / (missing + 1) as f64 * (1.0 - p) / p).ln();
-    }
-    sum
-}
-
 fn bin(deviation: f64) -> usize {
     let size = deviation.abs();
     let place = if size < DOUBLING {
@@ -125,25 +100,29 @@ fn bin(deviation: f64) -> usize {
 }
 
 impl OutlierPosterior {
-    /// Counts points with residuals up to the end of the band; `far` of all `n` have residuals that no inlier
-    /// has.
-    pub fn new(n: usize, far: usize, points: impl Iterator<Item = Bin>) -> Self {
-        let mut bins = vec![None; n];
+    /// Counts the `near` points, whose residuals `e` are at most the band's end, by the `deviations` of their
+    /// depths.
+    pub fn new(e: &[f64], near: &[u32], deviations: &[f64], is_inlier: &[bool]) -> Self {
+        let mut bins = vec![None; e.len()];
         let (mut fitted, mut beside) = ([0usize; BINS], [0usize; BINS]);
-        for point in points {
-            let place = bin(point.deviation);
-            bins[point.point as usize] = Some(place as u8);
-            fitted[place] += usize::from(point.is_inlier);
-            beside[place] += usize::from(BAND.contains(&point.residual.abs()));
+        for (&k, &deviation) in near.iter().zip(deviations) {
+            let (k, place) = (k as usize, bin(deviation));
+            bins[k] = Some(place as u8);
+            fitted[place] += usize::from(is_inlier[k]);
+            beside[place] += usize::from(BAND.contains(&e[k].abs()));
         }
-        let any = far as f64 > BEYOND * n as f64;
+        let far = e.iter().filter(|e| e.abs() >= BAND.start).count();
+        let any = far as f64 > BEYOND * e.len() as f64;
         let wider = INLIER / (BAND.end - BAND.start);
+        // Each outlier fits with the share of the strip of inliers; one more may be unseen.
+        let share = wider / (1.0 + wider);
         let (mut odds, mut dropped) = ([Odds { outliers: f64::INFINITY, information: 0.0 }; BINS], [false; BINS]);
         let (mut left, mut left_outliers) = (0.0, 0.0);
         for place in 0..BINS {
             let odd = place % SIZES >= FIRST.len();
             let (expected, count) = (beside[place] as f64 * wider, fitted[place] as f64);
-            let explained = any && by_chance(fitted[place], beside[place], wider) > RARE / BINS as f64;
+            let explained =
+                any && binomial_tail(fitted[place], fitted[place] + beside[place] + 1, share) > RARE / BINS as f64;
             let tail = place % SIZES >= TAIL;
             dropped[place] = odd && explained || tail && count < 2.0 * expected;
             let inliers = (count - expected) / WITHIN;
@@ -157,8 +136,8 @@ impl OutlierPosterior {
                 (left, left_outliers) = (left + count, left_outliers + expected.min(count));
             }
         }
-        let share = if left > 0.0 { left_outliers / left } else { 0.0 };
-        Self { bins, odds, dropped, share }
+        let kept = if left > 0.0 { left_outliers / left } else { 0.0 };
+        Self { bins, odds, dropped, share: kept }
     }
 
     /// Twice by how much, in nats, a point with the residual `e` is likelier among inliers and outliers than
@@ -181,8 +160,8 @@ impl OutlierPosterior {
 
 /// Times that the probabilities are updated on the way to a root, and a change of the direction, rad, that
 /// is not worth another.
-const ROUNDS: usize = 8;
-const SETTLED: f64 = 1e-3;
+pub(crate) const ROUNDS: usize = 8;
+pub(crate) const SETTLED: f64 = 1e-3;
 
 /// The points times the roots of weights: at a motion, those of inliers by their odds.
 pub(crate) fn weighted(
@@ -202,9 +181,9 @@ pub(crate) fn posterior(odds: &Odds, density: f64) -> f64 {
     density / (density + odds.outliers)
 }
 
-/// From the motion of the inliers, with the depths `smooth` of these in its weights (`None`: their own), to
-/// the root of the equation with probabilities, if it `moves`; the covariance, in the axes `tangent`, grows
-/// as the information shrinks. `None` where nothing is known of outliers.
+/// The root of the equation with probabilities, if it `moves` from the motion of the inliers, whose weights
+/// have the depths `smooth` (`None`: their own); its axes, and the covariance, which grows as the information
+/// shrinks. `None` where nothing is known of outliers.
 pub(crate) fn weighted_by_posterior(
     all: &Observations,
     known: &Consensus,
@@ -244,7 +223,7 @@ pub(crate) fn weighted_by_posterior(
     let axes = carried(tangent, &motion.u());
     let grown = informed(&motion, &axes).cholesky()?.l().transpose().try_inverse()? * before;
     let covariance = grown * covariance * grown.transpose();
-    Some((motion, axes, 0.5 * (covariance + covariance.transpose())))
+    Some((motion, axes, covariance.symmetric_part()))
 }
 
 /// The values of some of the points by point, for all others their mean.
@@ -302,20 +281,12 @@ mod tests {
     #[test]
     fn odd_depths_are_outliers_where_these_are_as_many() {
         let run = |odd: u32, beside: u32| {
-            let usual = (0..500).map(|k| (k, 0.1, true));
-            let odd = (500..500 + odd).map(|k| (k, 20.0, true));
-            let others = (700..700 + beside).map(|k| (k, 20.0, false));
-            let all = usual.chain(odd).chain(others);
-            let outliers = OutlierPosterior::new(
-                1000,
-                beside as usize,
-                all.map(|(point, deviation, is_inlier)| Bin {
-                    point,
-                    deviation,
-                    is_inlier,
-                    residual: if is_inlier { 0.5 } else { 7.0 },
-                }),
-            );
+            let (mut e, mut deviations) = (vec![0.5; 1000], vec![0.1; 500]);
+            deviations.resize((500 + odd + beside) as usize, 20.0);
+            e[700..700 + beside as usize].fill(7.0);
+            let near: Vec<u32> = (0..500 + odd).chain(700..700 + beside).collect();
+            let is_inlier: Vec<bool> = (0..1000).map(|k| k < 700).collect();
+            let outliers = OutlierPosterior::new(&e, &near, &deviations, &is_inlier);
             assert!(outliers.keeps(0));
             outliers.keeps(500)
         };

@@ -6,7 +6,7 @@ use crate::math::random::CounterRng;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{ALIGN, LESS_ROUND, Observations};
 use crate::motion3d::solver::refine::{StoppingCriteria, refine_cut};
-use crate::motion3d::solver::starts::{apart, evaluate, sample};
+use crate::motion3d::solver::starts::{apart, evaluate};
 use crate::simd::{Kernel, Lanes, dispatch};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -63,12 +63,11 @@ fn triple(n: usize, rng: CounterRng) -> [usize; 3] {
     [first, second, third + usize::from(third >= high)]
 }
 
-/// Every direction with its best rotation and cost `sum min((e / bound)^2, 1)`.
-///
-/// The spacing of the directions itself leaves residuals in proportion to a point's flow: each has a bound of
-/// its own, at least `least`, else the share `spacing` of its flow.
+/// Every direction with its best rotation and cost `sum min((e / bound)^2, 1)`. The spacing of the directions
+/// leaves residuals in proportion to flow: a point's bound is the share `spacing` of its flow, at least
+/// `least`.
 fn search(observations: &Observations, least: f64, spacing: f64, rng: CounterRng) -> Vec<(Motion, f64)> {
-    let chosen = sample(observations.n, SEARCHED, rng.stream(0));
+    let chosen = rng.stream(0).sample(observations.n, SEARCHED);
     let few: Vec<_> = chosen.iter().map(|&k| observations.row(k as usize)).collect();
     let draws = rng.stream(1);
     let triples: Vec<[usize; 3]> = (0..SAMPLES as u64).map(|i| triple(few.len(), draws.stream(i))).collect();

@@ -59,7 +59,7 @@ pub(crate) fn plugged(h: &Matrix5, p: &Matrix5) -> Option<PluginCovariances> {
     }
     let bound = inverse(&(h - p))?;
     let likelihood = bound * h * bound;
-    Some(PluginCovariances { likelihood: 0.5 * (likelihood + likelihood.transpose()), bound })
+    Some(PluginCovariances { likelihood: likelihood.symmetric_part(), bound })
 }
 
 /// The 2 x 2 block of the direction.

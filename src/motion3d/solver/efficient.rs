@@ -138,12 +138,8 @@ const SLOPES: std::ops::Range<f64> = 0.25..4.0;
 const MIN_SLOPE_RATIO: f64 = 1e-3;
 
 /// `A^-1 B A^-t` with `B = sum W^t W` and the slope `A = sum W^t D` of the equation, with its damped weights:
-/// `B^-1` if the weights had the right depths, more where they have not (steps that the smoother rounds off,
-/// depths from elsewhere).
-///
-/// `share`: how much of the points' own depths is in those of the weights. Without it the depths are known
-/// from elsewhere, free of the flow's noise: however wrong they are, only what they leave undetermined is not
-/// known.
+/// `B^-1` for weights with the right depths. `share`: how much of the points' own depths is in the weights;
+/// `None` for depths from elsewhere, free of the flow's noise.
 fn sandwich(
     observations: &Observations,
     motion: &Motion,
@@ -159,7 +155,7 @@ fn sandwich(
     let whiten = squares.cholesky()?.l().try_inverse()?;
     let relative = whiten * slope * whiten.transpose();
     let determined = if share.is_some() {
-        let sizes = SymmetricEigen::new(0.5 * (relative + relative.transpose())).eigenvalues;
+        let sizes = SymmetricEigen::new(relative.symmetric_part()).eigenvalues;
         sizes.iter().all(|size| SLOPES.contains(size))
     } else {
         let sizes = relative.singular_values();
@@ -167,7 +163,7 @@ fn sandwich(
     };
     let back = slope.try_inverse().filter(|_| determined);
     let covariance = back.map(|back| back * squares * back.transpose());
-    let covariance = covariance.map(|covariance| 0.5 * (covariance + covariance.transpose()));
+    let covariance = covariance.map(|covariance| covariance.symmetric_part());
     if share.is_some() { covariance.or(Some(plain)) } else { covariance.filter(|own| own.cholesky().is_some()) }
 }
 
@@ -201,7 +197,7 @@ pub(crate) fn nonlinearity_covariance(minimum: &Minimum, better: &Efficient) -> 
     let mut into = Matrix5::identity();
     into.fixed_view_mut::<2, 2>(0, 0).copy_from(&axes);
     let error = into * better.covariance * into.transpose() + apart * apart.transpose();
-    0.5 * (error + error.transpose())
+    error.symmetric_part()
 }
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! Takes the rotation of a motion out of displacements.
 //!
-//! Half way between both ends a displacement is the instantaneous flow to second order. The rest, of third
-//! order in rotation and translation, is in no covariance; rows that have the motion's own rotation taken out
-//! of them ([`derotation`](crate::motion3d::model::rows::Derotation)) have none.
+//! Half way between both ends a displacement is the instantaneous flow to second order only. Rows with the
+//! motion's own rotation taken out ([`Derotation`](crate::motion3d::model::rows::Derotation)) are exact.
 
 use super::likelihood::different;
 use super::refine::{Minimum, StoppingCriteria, refine};

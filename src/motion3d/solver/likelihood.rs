@@ -4,7 +4,7 @@ use super::covariance::direction_deviation;
 use super::efficient::{Efficient, WeightDepths, efficient};
 use super::refine::{FEWER, MANY, Minimum, StoppingCriteria, refine};
 use super::smoothing::DepthSmoother;
-use super::starts::{sample, starts};
+use super::starts::starts;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::{depths, equations};
 use crate::motion3d::model::motion::Motion;
@@ -59,7 +59,7 @@ pub(crate) fn minima(observations: &Observations, rng: CounterRng) -> Vec<Minimu
 /// The minima that starts lead to.
 fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) -> Vec<Minimum> {
     let refined = if observations.n > MANY {
-        let fewer = observations.subset(&sample(observations.n, FEWER, rng.stream(1)));
+        let fewer = observations.subset(&rng.stream(1).sample(observations.n, FEWER));
         let rough: Vec<Minimum> =
             starts.into_par_iter().map(|start| refine(&fewer, start, StoppingCriteria::ROUGH)).collect();
         let smoother = || DepthSmoother::new(&fewer, Smoother::Auto, rng.stream(6));
@@ -93,11 +93,8 @@ fn cost_tolerance(n: usize) -> f64 {
     8.0 * (n as f64).sqrt() + 25.0
 }
 
-/// The minima in the order of preference: by `J` and depth signs; where others come close, by the smoothness
-/// of their depths, too.
-///
-/// `J` alone is a coin toss between two minima: their residuals use different components of the noise, and
-/// differ by about `2 sqrt(n)` by chance.
+/// The minima in the order of preference: by `J` and depth signs, and where others come close by the
+/// smoothness of their depths, too, as the `J` of two minima differ by about `2 sqrt(n)` by chance.
 pub(crate) fn choose(
     observations: &Observations,
     minima: &[Minimum],
@@ -125,9 +122,8 @@ pub(crate) fn choose(
 /// are as likely.
 const UNDECIDED: f64 = 1.5;
 
-/// The smoothed weights' solution, from whichever of the minima leads to the likeliest, and another that is
-/// about as likely. A spurious minimum, whose epipole sits among noisy points, may lead nowhere, and without
-/// the noise of its depths a motion is easier to judge.
+/// The likeliest solution of the smoothed weights from any of the minima, and another that is about as
+/// likely. A spurious minimum, whose epipole sits among noisy points, may lead nowhere.
 pub(crate) fn smoothed(
     inliers: &Observations,
     options: &MotionOptions,

@@ -1,12 +1,10 @@
 //! What a covariance leaves out where the direction is known to a large share of the field only.
 //!
-//! It is the inverse of the information *at the estimate*. Along the direction that is known least, depths,
-//! and with them the information of the points, change: an estimate that is off may seem to know the motion
-//! much better than one that is right. So the confidence interval of that one unknown is looked for where it
-//! ends: where the estimating equation, with weights smoothed *there* and the other unknowns solved for, is
-//! off by as much as chance makes it in one case of twenty (C. Rao's score test, 1948, which needs the truth
-//! of the place only, not an estimate there). The standard deviation that has these ends is reported, with
-//! the curvature of the profile that they show, and with what the other unknowns are known to there.
+//! It is the inverse of the information *at the estimate*, which changes along the direction that is known
+//! least. The ends of that confidence interval are where the estimating equation, with weights smoothed
+//! *there* and the other unknowns solved for, is off by as much as chance makes it in one case of twenty (the
+//! score test of C. Rao 1948). The reported standard deviation has these ends, and the covariance the
+//! curvature of the profile and the covariance of the other unknowns there.
 
 use super::covariance::{damping, direction_block, direction_deviation, inverse};
 use super::refine::root;
@@ -28,8 +26,7 @@ pub(crate) const ROUND: f64 = 6.0;
 /// The 0.95 quantile of chi squared with one degree of freedom.
 const END: f64 = 3.841;
 
-/// Most places that an end is looked for at, how near its square deviation is to be, and the longest step
-/// from one to the next.
+/// Maximum number of places of the search for an end, tolerance of its score, and longest step.
 const PLACES: usize = 12;
 const NEAR: f64 = 0.1;
 const LONGEST: f64 = 2.0;
@@ -37,8 +34,8 @@ const LONGEST: f64 = 2.0;
 /// The farthest that is looked, rad: farther the direction is not known.
 const FARTHEST: f64 = 1.5;
 
-/// The direction's standard deviation as a share of the field beyond which no covariance describes the shape
-/// of the profile, whose every bend counts.
+/// Standard deviation of the direction, as a share of the field, beyond which no covariance describes the
+/// profile.
 const BEYOND: f64 = 1.5;
 
 /// Mean fourth power of a normal variable of variance 1.
@@ -94,9 +91,8 @@ impl ProfileLikelihood<'_> {
         }
     }
 
-    /// The covariance with what a curved and widening profile adds; the same where the direction is known
-    /// well beside the field. `weights`: the depths that weigh the equations at a motion. And whether that
-    /// describes the profile: it has ends, and is not so long that a covariance has none of its shape.
+    /// The covariance with what a curved profile adds, and whether that describes the profile: it has ends
+    /// within the field. `weights`: the depths that weigh the equations at a motion.
     pub fn lengthened(&self, covariance: &Matrix5, mut weights: impl FnMut(&Motion) -> Vec<f64>) -> (Matrix5, bool) {
         let axes = self.bent(covariance);
         let (mut out, mut described) = (*covariance, true);
@@ -154,7 +150,7 @@ impl ProfileLikelihood<'_> {
             rest += (end.covariance - here) * (2.0 * SIMPSON / count);
         }
         let out = into.transpose() * out * into;
-        let out = 0.5 * (out + out.transpose());
+        let out = out.symmetric_part();
         inverse(&out).map(|_| (out, found.len()))
     }
 

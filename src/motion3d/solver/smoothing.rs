@@ -3,7 +3,6 @@
 
 use super::refine::MANY;
 use super::regression::{Prediction, Site, regress};
-use super::starts::sample;
 use crate::math::kd_tree::{Neighbours, SIZES, Tree};
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::Depths;
@@ -55,7 +54,7 @@ impl DepthSmoother {
     pub fn new(observations: &Observations, which: Smoother, rng: CounterRng) -> Self {
         let tree = Tree::new(&observations.site);
         let n = observations.n;
-        let compared = sample(n, MANY, rng);
+        let compared = rng.sample(n, MANY);
         let most = SIZES.into_iter().rfind(|&k| k < n);
         let lists = most.map_or_else(Neighbours::default, |k| tree.nearest(&compared, k));
         Self {

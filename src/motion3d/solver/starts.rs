@@ -40,19 +40,6 @@ pub(crate) fn half_sphere() -> Vec<Vector3<f64>> {
     (0..DIRECTIONS).map(direction).collect()
 }
 
-/// `count` different indices below `n`, ascending, at random: the same for the same seed.
-pub(crate) fn sample(n: usize, count: usize, rng: CounterRng) -> Vec<u32> {
-    if count >= n {
-        return (0..n as u32).collect();
-    }
-    // Those with the smallest random keys.
-    let mut keyed: Vec<(u64, u32)> = (0..n as u32).map(|k| (rng.bits(u64::from(k)), k)).collect();
-    keyed.select_nth_unstable(count - 1);
-    let mut chosen: Vec<u32> = keyed[..count].iter().map(|&(_, k)| k).collect();
-    chosen.sort_unstable();
-    chosen
-}
-
 /// Evaluates every direction of the half sphere, in groups that threads share.
 pub(crate) fn evaluate<R: Send>(work: impl Fn(&Vector3<f64>) -> Option<R> + Sync) -> Vec<R> {
     let groups: Vec<Vec<R>> =
@@ -80,7 +67,7 @@ pub(crate) fn apart(mut motions: Vec<(Motion, f64)>, apart: f64, count: usize) -
 /// All points, or `most` random ones.
 pub(crate) fn at_most(observations: &Observations, most: usize, rng: CounterRng) -> Cow<'_, Observations> {
     if observations.n > most {
-        Cow::Owned(observations.subset(&sample(observations.n, most, rng)))
+        Cow::Owned(observations.subset(&rng.sample(observations.n, most)))
     } else {
         Cow::Borrowed(observations)
     }
@@ -130,13 +117,5 @@ mod tests {
             let nearest = directions.iter().map(|d| d.dot(&any).abs()).fold(0.0, f64::max);
             assert!(nearest.acos().to_degrees() < 8.5, "{any}: {}", nearest.acos().to_degrees());
         }
-    }
-
-    #[test]
-    fn samples_are_different_indices() {
-        let chosen = sample(100, 30, CounterRng::new(4));
-        assert!(chosen.len() == 30 && chosen.windows(2).all(|pair| pair[0] < pair[1]) && chosen[29] < 100);
-        assert_ne!(chosen, sample(100, 30, CounterRng::new(5)));
-        assert_eq!(sample(3, 30, CounterRng::new(5)), [0, 1, 2]);
     }
 }
