@@ -20,6 +20,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("motion3d.region_by_chance", "directions that residuals alone exclude are compared by depths and scores"),
     ("motion3d.basins", "starts from a few steps on a few points"),
     ("flow.brightness_change", "gain and offset between frames are measured and removed"),
+    ("flow.weighted_median", "beside motion boundaries a weighted median of the flow is tried"),
     ("flow.block_matches", "blocks are searched for on a coarse level"),
     ("flow.robust_peak_locking", "patches that scatter have little weight in peak locking"),
     ("edges.contrast", "gain between the cameras is estimated and taken out"),

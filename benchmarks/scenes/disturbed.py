@@ -90,3 +90,26 @@ def shifted_speckle(seed: int, shift: tuple[int, int]) -> list[Array]:
     speckle = 128 + 40 * speckle / speckle.std()
     u, v = shift
     return [speckle[110:510, 110:510], speckle[110 - v : 510 - v, 110 - u : 510 - u]]
+
+
+def layered(seed: int) -> tuple[list[Array], Array, Array]:
+    """A disc that moves before a ground at rest, both faintly textured; with the flow of the first frame and the
+    pixels within 10 px of the boundary that both frames show."""
+    y, x = np.indices(SIZE).astype(float)
+    middle, radius, move = (SIZE[1] / 2 - 3, SIZE[0] / 2), 55.0, (6.0, 2.0)
+    ground, disc = 80 + 6 * texture(seed), 140 + 6 * texture(seed + 100)
+
+    def distance(time: float) -> Array:
+        """From the boundary, px; negative on the disc."""
+        found: Array = np.hypot(x - middle[0] - time * move[0], y - middle[1] - time * move[1]) - radius
+        return found
+
+    def frame(time: int) -> Array:
+        share = np.clip(distance(time) + 0.5, 0, 1)
+        shown = share * view(ground, (0, 0)) + (1 - share) * view(disc, (time * move[0], time * move[1]))
+        return noisy(shown, seed + time)
+
+    on_disc = distance(0) < 0
+    flow = np.where(on_disc[..., None], move, 0.0)
+    near = (np.abs(distance(0)) < 10) & (on_disc | (distance(1) > 0.5)) & (np.abs(distance(0)) > 1)
+    return [frame(0), frame(1)], flow, near

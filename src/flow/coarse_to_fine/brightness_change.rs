@@ -128,10 +128,22 @@ impl LightMap {
 
     fn remove_from<T: SimdReal>(&self, frame: &Frame<T>) -> Frame<T> {
         let mut out = frame.clone();
+        if self.nodes.iter().all(|node| *node == [1.0, 0.0]) {
+            return out;
+        }
         out.data_mut().par_chunks_mut(frame.width().max(1)).enumerate().for_each(|(y, row)| {
-            for (x, value) in row.iter_mut().enumerate() {
-                let [gain, offset] = self.at(x as f64, y as f64);
-                *value = T::from_f64((value.to_f64() - offset) / gain);
+            // Linear in x between two columns of nodes.
+            for first in 0..self.columns.max(2) - 1 {
+                let pixel = |column: usize| ((column as f64 * self.pitch).ceil() as usize).min(row.len());
+                let start = if first == 0 { 0 } else { pixel(first) };
+                let end = if first + 2 >= self.columns { row.len() } else { pixel(first + 1) };
+                let [gain, offset] = self.at(start as f64, y as f64);
+                let steps = self.at(start as f64 + 1.0, y as f64);
+                for (x, value) in row[start..end].iter_mut().enumerate() {
+                    let along = x as f64;
+                    let gain = gain + along * (steps[0] - gain);
+                    *value = T::from_f64((value.to_f64() - offset - along * (steps[1] - offset)) / gain);
+                }
             }
         });
         out

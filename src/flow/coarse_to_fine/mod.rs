@@ -15,7 +15,7 @@
 //!    [`output`]: the field at the requested sites, with status and diagnostics.
 //!
 //! [`estimator`] runs the stages, [`schedule`] says how much work each level gets, [`estimate`] is what the
-//! stages leave for covariance and output. [`planes`], [`plane_pool`] and [`workspace`] hold
+//! stages leave for covariance and output. [`planes`], [`extended`], [`plane_pool`] and [`workspace`] hold
 //! the memory.
 //!
 //! Flow of a pair belongs to the pixels of the first frame. Every usable pixel gets an estimate; untextured
@@ -32,6 +32,7 @@ mod data_term;
 mod descent;
 mod estimate;
 mod estimator;
+mod extended;
 mod options;
 mod output;
 mod peak_locking;

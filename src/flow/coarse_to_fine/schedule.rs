@@ -19,6 +19,8 @@ pub(super) struct Schedule {
     pub smoothness: Smoothness,
     /// Relaxation sweeps on the finest level: cheap, they remove most of what one linearisation leaves.
     pub finest_sweeps: usize,
+    /// Last iterations on the finest level before which the flow is sharpened at motion boundaries.
+    pub finest_sharpened: usize,
     /// Whether blocks are searched for on a coarse level (large motions).
     pub searches: bool,
     /// Levels above the finest from which the unregularised trial is run (small objects); `None`: never.
@@ -39,6 +41,9 @@ const COARSE_BREAK_STRAIN: f64 = 0.07;
 
 /// Maximum size, pixels, of the level on which blocks are searched for.
 const MAX_SEARCHED_PIXELS: usize = 20_000;
+/// Levels, from the finest up, on which the flow is sharpened at motion boundaries: coarser ones have few
+/// sites.
+const SHARPENED_LEVELS: usize = 3;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct LevelSchedule {
@@ -47,6 +52,8 @@ pub(super) struct LevelSchedule {
     pub tolerance: f64,
     pub smoothness: Smoothness,
     pub runs_trial: bool,
+    /// Iteration from which on the flow is sharpened at motion boundaries.
+    pub sharpens_from: usize,
     /// Whether blocks are searched for.
     pub searches: bool,
     pub refines: bool,
@@ -55,8 +62,8 @@ pub(super) struct LevelSchedule {
 impl Schedule {
     pub fn new(preset: Preset, frames: usize) -> Self {
         let smoothness = Smoothness::default();
-        // Three frames have less noise than two: another linearisation pays.
-        let (finest_tolerance, finest_sweeps) = if frames == 2 { (0.035, 6) } else { (0.023, 4) };
+        // Sweeps are cheap, and remove most of what the few linearisations of a pair leave.
+        let finest_sweeps = if frames == 2 { 6 } else { 4 };
         match preset {
             Preset::Fast => Self {
                 finest_level: 1,
@@ -65,6 +72,7 @@ impl Schedule {
                 tolerance: [0.02; 2],
                 smoothness: Smoothness { sweeps: 4, ..smoothness },
                 finest_sweeps: 4,
+                finest_sharpened: 0,
                 searches: false,
                 trial_from: None,
                 refines_intermediate: false,
@@ -73,9 +81,10 @@ impl Schedule {
                 finest_level: 0,
                 iterations: [3, 5, 5],
                 next_frame_iterations: [2, 5, 5],
-                tolerance: [finest_tolerance, 0.023],
+                tolerance: [0.023; 2],
                 smoothness: Smoothness { sweeps: 4, break_strain: 0.14, ..smoothness },
                 finest_sweeps,
+                finest_sharpened: 1,
                 searches: true,
                 trial_from: Some(2),
                 refines_intermediate: true,
@@ -85,8 +94,10 @@ impl Schedule {
                 iterations: [4, 6, 6],
                 next_frame_iterations: [4, 6, 6],
                 tolerance: [0.003; 2],
-                smoothness: Smoothness { break_strain: 0.2, ..smoothness },
+                // More iterations undo less smoothing: noise is held back by the terms instead.
+                smoothness: Smoothness { flow: 40.0, jacobian: 8000.0, break_strain: 0.2, ..smoothness },
                 finest_sweeps: smoothness.sweeps,
+                finest_sharpened: usize::MAX,
                 searches: true,
                 trial_from: Some(2),
                 refines_intermediate: true,
@@ -135,6 +146,11 @@ impl Schedule {
             tolerance,
             smoothness: Smoothness { sweeps, ..self.smoothness },
             runs_trial: false,
+            sharpens_from: match k {
+                _ if k <= self.finest_level => max_iterations.saturating_sub(self.finest_sharpened),
+                _ if k < self.finest_level + SHARPENED_LEVELS => 1,
+                _ => usize::MAX,
+            },
             searches: false,
             refines: false,
         }

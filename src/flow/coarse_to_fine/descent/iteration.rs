@@ -3,6 +3,7 @@
 use super::DescentPlan;
 use super::block_matches::block_matches;
 use super::comparison::Comparison;
+use super::weighted_median::{BrightnessStd, sharpen_boundaries};
 use crate::ablation::keeps;
 use crate::flow::coarse_to_fine::brightness_scale::MIN_RESIDUAL_SHARE;
 use crate::flow::coarse_to_fine::data_term::{DataTerm, MOTION, Pool};
@@ -93,6 +94,14 @@ impl<T: SimdReal> Iteration<'_, T> {
             }
         }
         space.keep(trial);
+    }
+
+    /// Sharpens the flow at motion boundaries.
+    pub fn sharpen(&self, level: &PyramidLevel<T>, motion: &mut Planes<T>, space: &PlanePool<T>) {
+        if let Some(residual) = self.residual_std.filter(|_| keeps("flow.weighted_median")) {
+            let std = BrightnessStd { picture: self.plan.brightness.contrast, residual: residual.to_f64() };
+            sharpen_boundaries(self.plan.simd, space, &level.views(self.compared), std, motion);
+        }
     }
 
     /// Takes over matches of blocks where they leave less residual energy.

@@ -9,6 +9,7 @@ pub(super) mod comparison;
 mod given;
 mod intermediate;
 mod iteration;
+mod weighted_median;
 
 use super::brightness_scale::BrightnessScale;
 use super::data_term::{COUNT, DataOptions, DataTerm, MOTION, summary};
@@ -186,7 +187,10 @@ impl DescentPlan {
                 std::mem::swap(&mut motion, &mut old);
                 finer(self.simd, &old, level.size, &mut motion);
             }
-            for _ in 0..schedule.max_iterations {
+            for n in 0..schedule.max_iterations {
+                if n >= schedule.sharpens_from {
+                    step.sharpen(level, &mut motion, space);
+                }
                 let change = step.advance(level, &schedule.smoothness, (&mut motion, &mut old));
                 // The finest level does not wait for objects: coarser levels have found them.
                 let is_calm = || k == self.finest || has_settled(&old, &motion);

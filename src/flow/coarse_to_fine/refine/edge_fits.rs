@@ -8,10 +8,10 @@
 //! no motion has, which reaches as far as the window.
 
 use super::choose::{Choice, Use};
-use super::extended::{Field, RIM, chunk_of};
 use super::fit::FIT;
 use super::plain_fits::any_positive;
 use super::upsample::widen;
+use crate::flow::coarse_to_fine::extended::{Field, RIM, chunk_of};
 use crate::flow::coarse_to_fine::planes::{CHUNK, LEFT};
 use crate::simd::{Lanes, SimdReal};
 

@@ -3,10 +3,10 @@
 use super::RefineOptions;
 use super::choose::{Choice, Use};
 use super::edge_fits::{Edges, Lines, Site};
-use super::extended::{Field, chunk_of};
 use super::fit::FIT;
 use super::plain_fits::any_positive;
 use super::upsample::widen;
+use crate::flow::coarse_to_fine::extended::{Field, chunk_of};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::{CHUNK, LEFT, Planes};
 use crate::parallel::for_each_band;

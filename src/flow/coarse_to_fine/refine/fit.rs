@@ -1,7 +1,7 @@
 //! Affine fits to the flow in Gaussian windows, and the grids they are computed on.
 
-use super::extended::{Continuation, Field, RIM};
 use super::ladder::{EXTRA_PASSES, Scale, TERMS, Taps};
+use crate::flow::coarse_to_fine::extended::{Continuation, Field, RIM};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::LEFT;
 use crate::flow::moment_filter::filter;

@@ -1,6 +1,6 @@
 //! Ladder of windows: the grid that each is computed on, its taps, and the noise it leaves.
 
-use super::extended::RIM;
+use crate::flow::coarse_to_fine::extended::RIM;
 use crate::flow::moment_filter::weights;
 use crate::simd::SimdReal;
 use std::f64::consts::PI;

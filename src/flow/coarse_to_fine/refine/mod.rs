@@ -6,8 +6,7 @@
 //! * [`ladder`], [`fit`]: affine fits `K_l` to the flow in Gaussian windows of growing sigma, each repeated
 //!   on its residual: `1 - (1 - K)^4`. Repeating once is J. W. Tukey's twicing (*Exploratory Data Analysis*,
 //!   1977), more often P. Buehlmann and B. Yu's boosting ("Boosting with the L2 loss", 2003): bias of sixth
-//!   order cancels too, and a window may be half as wide again for the same bias. [`extended`] has the
-//!   planes.
+//!   order cancels too, and a window may be half as wide again for the same bias.
 //! * [`regional_means`]: robust means of changes, misfits and data around each node.
 //! * [`choose`]: O. V. Lepski's comparison of scales (1991) with soft decisions. From one window to the next
 //!   the flow may change by what noise explains. With `D_l` the squared change, `d_l` its variance for white
@@ -25,7 +24,6 @@
 
 mod choose;
 mod edge_fits;
-mod extended;
 mod finish;
 mod fit;
 mod ladder;
@@ -35,10 +33,10 @@ mod regional_means;
 mod upsample;
 mod window_statistics;
 
+use super::extended::Field;
 use super::plane_pool::PlanePool;
 use super::planes::{LEFT, Planes, SITE_SPACING};
 use crate::simd::{Level, SimdReal};
-use extended::Field;
 use fit::{FIT, FLOW};
 pub(super) use ladder::TERMS;
 use ladder::{Ladder, Scale};

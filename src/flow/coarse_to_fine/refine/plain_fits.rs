@@ -1,10 +1,10 @@
 //! Plain fits: the weighted mean of the windows' fits where the flow is smooth, from the coarsest grid on.
 
 use super::choose::{Choice, Use};
-use super::extended::{Continuation, Field};
 use super::fit::{FIT, MIN_MISFIT, fit_row};
 use super::ladder::{EXTRA_PASSES, Scale, TERMS};
 use super::upsample::{grow_row, widen};
+use crate::flow::coarse_to_fine::extended::{Continuation, Field};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::LEFT;
 use crate::parallel::for_each_band;

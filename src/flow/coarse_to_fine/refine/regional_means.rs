@@ -3,10 +3,10 @@
 //! The mean is a power mean `(G * f^p)^(1/p)`: p = 1/4 is near a median, p = -1/4 near the calm part.
 
 use super::RefineOptions;
-use super::extended::{Continuation, Field, RIM};
 use super::fit::{FIT, pick, smooth_row};
 use super::ladder::{Ladder, MAX_OCTAVE, Taps};
 use crate::flow::coarse_to_fine::data_term::{ENERGY, UU, UV, VV};
+use crate::flow::coarse_to_fine::extended::{Continuation, Field, RIM};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
 use crate::parallel::for_each_band;

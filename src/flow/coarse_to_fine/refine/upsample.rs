@@ -1,8 +1,8 @@
 //! Interpolation from coarse sites to fine ones.
 
 use super::choose::Choice;
-use super::extended::{Continuation, Field, RIM};
 use super::ladder::MAX_OCTAVE;
+use crate::flow::coarse_to_fine::extended::{Continuation, Field, RIM};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::LEFT;
 use crate::math::Real;
