@@ -8,7 +8,7 @@
 //! explains the pixels around the site better than the present motion; small objects therefore remain.
 
 use crate::flow::coarse_to_fine::data_term::View;
-use crate::flow::coarse_to_fine::extended::{Field, RIM};
+use crate::flow::coarse_to_fine::extended::Field;
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::{LEFT, Planes, SITE_SPACING};
 use crate::parallel::for_each_band;
