@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, gaussian_filter
+
+import jacoflow
 
 Array = NDArray[np.floating]
 Mask = NDArray[np.bool_]
@@ -66,3 +69,52 @@ def jacobian_error(jacobian: Array, truth: Array, where: Mask) -> float:
     """Root-mean-square error over the four entries of Jacobians (H, W, 2, 2), 1/frame, where there is one."""
     have = where & np.isfinite(jacobian).all(axis=(-2, -1))
     return root_mean_square((jacobian - truth)[have])
+
+
+FROM_BOUNDARY = 10
+"""Distance from motion boundaries, px, beyond which intervals are counted as interior."""
+TRUTH_SIGMA = 4.0
+"""Of the Gaussian that takes the noise of a recording's truth out before its Jacobian, px."""
+LARGE_ERROR = 1.0
+"""px; it is silent where the stated standard deviation is below a fifth of it and the status is OK."""
+NORMAL = 1.959964
+"""Half the width of a 95 % interval, standard deviations."""
+
+
+def interior(truth: Array) -> Mask:
+    """Pixels with a truth, 16 px from the frame's edge and more than 10 px from motion boundaries."""
+    jacobian = differences(truth)
+    edge = np.abs(np.nan_to_num(jacobian)).max(axis=(-2, -1)) >= EDGE
+    known = np.isfinite(truth).all(axis=-1)
+    return known & inside(known.shape, 16) & (distance_transform_edt(~edge) > FROM_BOUNDARY)
+
+
+def intervals(field: jacoflow.FlowField, truth: Array) -> dict[str, float]:
+    """Shares of 95 % intervals that hold: u, v and Jacobian (truth smoothed) in the interior, flow at all pixels with
+    a truth; mean squared normalised error of (u, v), 1 if the covariance is right; share of large errors that are
+    silent, and of pixels with large errors."""
+    where, known = interior(truth), np.isfinite(truth).all(axis=-1)
+    error, std = field.flow - truth, np.stack([field.std("u"), field.std("v")], axis=-1)
+    share = np.where(known, 1.0, 0.0)
+    smooth = [gaussian_filter(np.nan_to_num(truth[..., c]), TRUTH_SIGMA) for c in (0, 1)]
+    slopes = differences(np.stack(smooth, axis=-1) / np.maximum(gaussian_filter(share, TRUTH_SIGMA), 1e-9)[..., None])
+    holds = [
+        np.abs(field.value(name) - slopes[..., row, column]) <= NORMAL * field.std(name)
+        for name, row, column in (("u_x", 0, 0), ("u_y", 0, 1), ("v_x", 1, 0), ("v_y", 1, 1))
+    ]
+    held = np.abs(error) <= NORMAL * std
+    squares = np.einsum(
+        "...i,...ij,...j", error[where], np.linalg.inv(field.covariance[where][:, :2, :2]), error[where]
+    )
+    length = np.linalg.norm(error, axis=-1)
+    large = known & (length > LARGE_ERROR)
+    silent = large & (np.hypot(*np.moveaxis(std, -1, 0)) < length / 5) & (field.status == jacoflow.Status.OK)
+    return {
+        "u": float(held[where][:, 0].mean()),
+        "v": float(held[where][:, 1].mean()),
+        "jacobian": float(np.mean([hold[where].mean() for hold in holds])),
+        "nees": float(squares.mean() / 2),
+        "all": float(held[known].mean()),
+        "silent": float(silent.sum() / max(large.sum(), 1)),
+        "large": float(large.sum() / max(known.sum(), 1)),
+    }

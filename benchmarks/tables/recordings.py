@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+import jacoflow
 from benchmarks import report
 from benchmarks.rivals import flow as rivals
 from benchmarks.scenes import recordings as samples
@@ -19,6 +20,7 @@ from benchmarks.scores.flow import (
     differences,
     end_point_error,
     inside,
+    intervals,
     jacobian_error,
     root_mean_square,
     usable,
@@ -121,6 +123,23 @@ def table(data: Path, ours: list[Setting] = RECORDINGS, readers: Readers = sampl
     return rows + [{"sample": line, "method": "skipped"} for line in missing]
 
 
+def uncertainty(data: Path, presets: tuple[str, ...] = ("balanced", "fast", "accurate")) -> list[Row]:
+    """Intervals of pairs and, in the preset `balanced`, of triples: `benchmarks.scores.flow.intervals`."""
+    if samples.cv2 is None:
+        return []
+    rows: list[Row] = []
+    found, missing = samples.read_all(samples.FLOWS + samples.LAYERED, data)
+    for sample, preset in ((sample, preset) for sample in found for preset in presets):
+        for count in (2, 3) if preset == "balanced" and len(sample.frames) > 2 else (2,):
+            frames = sample.pair() if count == 2 else sample.frames
+            method = jacoflow.CoarseToFine(preset=preset, time_scheme="pair" if count == 2 else None)
+            found_field = jacoflow.estimate(frames, method=method)
+            rows.append(
+                {"sample": sample.name, "preset": preset, "frames": count, **intervals(found_field, sample.truth)}
+            )
+    return rows + [{"sample": line, "preset": "skipped"} for line in missing]
+
+
 def strain(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
     """Image correlation: root mean square error of u (px, all pixels) and of u_x (1/frame, off the edge).
 
@@ -185,6 +204,9 @@ TABLES = {
     "layered": report.Table(
         "Accuracy at motion boundaries",
         lambda o: [] if o.data is None else table(o.data, readers=samples.LAYERED),
+    ),
+    "uncertainty": report.Table(
+        "Intervals on recordings", lambda o: [] if o.data is None else uncertainty(o.data)
     ),
     "strain": report.Table(
         "Strain from image correlation", lambda o: [] if o.data is None else strain(o.data)

@@ -172,7 +172,7 @@ class FlowField:
         """Status code of each site, uint8 array (..., H, W), see `Status`."""
     @property
     def valid(self) -> NDArray[np.bool_]:
-        """Where the estimate is unique and complete, bool array (..., H, W)."""
+        """Where the estimate may be used, unique, complete and not contradicted, bool array (..., H, W)."""
     @property
     def residual(self) -> _Floats | None:
         """Root mean square residual of the equations, array (..., H, W), grey levels; None if the method has
@@ -278,7 +278,7 @@ class FlowField:
 
         `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites
         the flow is bilinear in what the four sites about a point say of it by flow and Jacobian: affine
-        motion is exact. NaN outside the sites, where one of them is not `valid`, and from then on.
+        motion is exact. NaN outside the sites, where one of them has no estimate, and from then on.
 
         With `covariance`, (N, 2, 2) or (2, 2) for all points, px^2, a pair: the points, and their covariance
         (N, 2, 2), for a stack (T + 1, N, 2, 2). It becomes (I + M) C (I + M)^T with the Jacobian M, plus the
@@ -296,7 +296,7 @@ class FlowField:
 
         `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites
         the flow is bilinear in what the four sites about a point say of it by flow and Jacobian: affine
-        motion is exact. NaN outside the sites, where one of them is not `valid`, and from then on.
+        motion is exact. NaN outside the sites, where one of them has no estimate, and from then on.
 
         With `covariance`, (N, 2, 2) or (2, 2) for all points, px^2, a pair: the points, and their covariance
         (N, 2, 2), for a stack (T + 1, N, 2, 2). It becomes (I + M) C (I + M)^T with the Jacobian M, plus the

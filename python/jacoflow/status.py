@@ -34,4 +34,4 @@ class Status(IntEnum):
     INCONSISTENT = 8
     """A full estimate that the frames contradict: along it brightness changes by far more than usual. What is
     seen is hidden in another frame (occlusion), has
-    changed, or moves differently; the covariance does not know. Only "coarse_to_fine" reports it."""
+    changed, or moves differently; the covariance does not know, and the pixel is not `valid`. Only "coarse_to_fine" reports it."""

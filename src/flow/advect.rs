@@ -137,7 +137,7 @@ impl Lattice {
         let flow = |dx: usize, dy: usize| -> Option<[f64; 2]> {
             let (x, y) = (column + dx, row + dy);
             let site = y * field.width + x;
-            let there = x < field.width && y < field.height && field.status[site].is_valid();
+            let there = x < field.width && y < field.height && field.status[site].has_estimate();
             there.then(|| field.affine(site).to_array()).map(|m| [m[0].to_f64(), m[1].to_f64()])
         };
         let step = |after: Option<[f64; 2]>, before: Option<[f64; 2]>, weight: f64| -> [f64; 2] {
@@ -156,7 +156,7 @@ impl Between {
     /// Adds the affine motion of one site at an `offset` from it, px; `None` if it has no valid estimate.
     fn add<T: Real>(&mut self, field: &FlowField<T>, site: usize, offset: [f64; 2], weight: f64) -> Option<()> {
         let m = field.affine(site).to_array().map(T::to_f64);
-        if !field.status[site].is_valid() || !m.iter().all(|value| value.is_finite()) {
+        if !field.status[site].has_estimate() || !m.iter().all(|value| value.is_finite()) {
             return None;
         }
         let [dx, dy] = offset;

@@ -23,7 +23,7 @@ pub enum Status {
     Predicted = 7,
     /// A full estimate that the frames contradict: brightness changes along it by far more than usual. The
     /// pixel is occluded in another frame, has changed, or moves differently; the covariance does not include
-    /// this.
+    /// this, and the estimate is not valid.
     Inconsistent = 8,
 }
 
@@ -61,8 +61,13 @@ impl Status {
         Self::ALL.get(code as usize).copied()
     }
 
-    /// Whether the estimate is unique and complete.
+    /// Whether the estimate may be used: it is unique and complete, and the frames do not contradict it.
     pub fn is_valid(self) -> bool {
+        self.has_estimate() && self != Self::Inconsistent
+    }
+
+    /// Whether there is a unique and complete estimate, even one that the frames contradict.
+    pub fn has_estimate(self) -> bool {
         matches!(self, Self::Ok | Self::Repaired | Self::Predicted | Self::Inconsistent)
     }
 }

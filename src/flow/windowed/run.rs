@@ -245,11 +245,11 @@ fn withdraw_unusable<T: SimdReal>(band: &mut FieldBand<'_, T>, places: Range<usi
     for place in places {
         let is_negative = |i: usize| band.covariance.get(upper(i, i)).is_some_and(|plane| plane[place] < T::default());
         let broken = band.covariance.iter().any(|plane| !plane[place].finite()) || (0..6).any(is_negative);
-        if broken && band.status[place].is_valid() {
+        if broken && band.status[place].has_estimate() {
             band.status[place] = Status::NonFinite;
             band.covariance.iter_mut().for_each(|plane| plane[place] = T::nan());
         }
-        if !band.status[place].is_valid() && band.status[place] != Status::MinNorm {
+        if !band.status[place].has_estimate() && band.status[place] != Status::MinNorm {
             band.motion.iter_mut().for_each(|plane| plane[place] = T::nan());
         }
     }

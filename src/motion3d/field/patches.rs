@@ -4,7 +4,7 @@ use super::{common_errors, is_within, site_pixels};
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::motion3d::diagnostics::correlated_noise::area;
-use crate::motion3d::model::input::{check_field, is_usable};
+use crate::motion3d::model::input::{check_field};
 use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::patches::AffinePatches;
 use crate::parallel::Threads;
@@ -114,7 +114,7 @@ impl Windows {
     fn pixels_of_windows<T: Real>(&self, field: &FlowField<T>, region: Option<Rect>) -> Vec<Vec<usize>> {
         let mut out = vec![Vec::new(); self.columns * self.rows];
         for (site, at) in site_pixels(field, 1).filter(|(_, at)| is_within(region, *at)) {
-            if let Some(window) = self.of(at).filter(|_| is_usable(field, site)) {
+            if let Some(window) = self.of(at).filter(|_| field.status[site].is_valid()) {
                 out[window].push(site);
             }
         }

@@ -4,7 +4,7 @@
 use super::rows::tangents;
 use crate::error::{Error, Result, numbers};
 use crate::math::Real;
-use crate::types::{FlowField, Intrinsics, Status};
+use crate::types::{FlowField, Intrinsics};
 use nalgebra::{Matrix2, Matrix6, SMatrix, Vector2, Vector3};
 
 /// Points with their flow, N of each.
@@ -162,14 +162,9 @@ pub(crate) fn check_field<T>(field: &FlowField<T>) -> Result<()> {
     Ok(())
 }
 
-/// Whether a site of a field is usable.
-pub(crate) fn is_usable<T>(field: &FlowField<T>, site: usize) -> bool {
-    field.status[site].is_valid() && field.status[site] != Status::Inconsistent
-}
-
-/// The flow and its covariance at a usable site.
+/// The flow and its covariance at a valid site.
 pub(crate) fn measurement<T: Real>(field: &FlowField<T>, site: usize) -> Option<(Vector2<f64>, Matrix2<f64>)> {
-    let [[uu, uv, ..], [vu, vv, ..], ..] = field.covariance_at(site).filter(|_| is_usable(field, site))?;
+    let [[uu, uv, ..], [vu, vv, ..], ..] = field.covariance_at(site).filter(|_| field.status[site].is_valid())?;
     let [u, v, ..] = field.affine(site).to_array().map(Real::to_f64);
     let uv = 0.5 * (uv + vu);
     Some((Vector2::new(u, v), Matrix2::new(uu, uv, uv, vv)))

@@ -34,7 +34,7 @@ getters! {
     v_y(this, slf) -> PyResult<Bound<'py, PyAny>> = Self::motion_slice(slf, 5, &[]);
     /// Status code of each site, uint8 array (..., H, W), see `Status`.
     status(this, slf) -> PyResult<Bound<'py, PyAny>> = each!(this.store, packed => Self::show(slf, &Slice { data: &packed.status, planes: 1, first: 0, tail: &[] }));
-    /// Where the estimate is unique and complete, bool array (..., H, W).
+    /// Where the estimate may be used, unique, complete and not contradicted, bool array (..., H, W).
     valid(this, slf) -> PyResult<Bound<'py, PyAny>> = {
         let (width, height) = this.size();
         let sites = width * height;

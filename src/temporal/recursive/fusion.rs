@@ -193,7 +193,7 @@ impl<T: SimdReal> Task<'_, T> {
     /// Copies a block of sites; a harmless estimate where there is no usable one.
     fn read(&self, sites: Range<usize>, input: &mut [T]) {
         let mut usable = [false; BLOCK];
-        usable.iter_mut().zip(&self.status[sites.clone()]).for_each(|(usable, status)| *usable = status.is_valid());
+        usable.iter_mut().zip(&self.status[sites.clone()]).for_each(|(usable, status)| *usable = status.has_estimate());
         let (given, present) = input.split_at_mut(PRESENT * BLOCK);
         let (estimate, systematic) = given.split_at_mut((6 + ENTRIES) * BLOCK);
         let motion = self.motion.iter().chain(&self.covariance).map(|plane| &plane[sites.clone()]);

@@ -148,11 +148,11 @@ impl<T: SimdReal> Writer<'_, T> {
     fn finish_site(&self, band: &mut FieldBand<'_, T>, at: usize, pixel: (usize, usize)) {
         let status = self.status(pixel);
         band.status[at] = status;
-        if !status.is_valid() {
+        if !status.has_estimate() {
             let planes = band.motion.iter_mut().chain(&mut band.covariance).chain(&mut band.systematic);
             planes.for_each(|plane| plane[at] = T::nan());
         }
-        self.diagnose(band, at, pixel, status.is_valid());
+        self.diagnose(band, at, pixel, status.has_estimate());
     }
 
     /// Whether every pixel of row `y` has a valid estimate and no diagnostics are requested.
