@@ -491,7 +491,7 @@ fn a_jump_is_contradicted_and_a_small_motion_is_not() {
             let common = EstimatorOptions { covariance: true, ..EstimatorOptions::default() };
             let estimator = Estimator::new(Method::Windowed(options.clone()), common).unwrap();
             let field = estimator.estimate(&noisy.iter().collect::<Vec<_>>(), 0).unwrap();
-            let known: Vec<Status> = field.status.iter().copied().filter(|status| status.is_valid()).collect();
+            let known: Vec<Status> = field.status.iter().copied().filter(|status| status.has_estimate()).collect();
             let contradicted = known.iter().filter(|&&status| status == Status::Inconsistent).count();
             let share = contradicted as f64 / known.len() as f64;
             println!("{frames} frames, {motion:?}: {share:.3} inconsistent");
