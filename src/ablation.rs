@@ -21,6 +21,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("motion3d.basins", "starts from a few steps on a few points"),
     ("flow.brightness_change", "gain and offset between frames are measured and removed"),
     ("flow.weighted_median", "beside motion boundaries a weighted median of the flow is tried"),
+    ("flow.boundary_error", "jumps of the motion nearby widen the covariance"),
     ("flow.block_matches", "blocks are searched for on a coarse level"),
     ("flow.robust_peak_locking", "patches that scatter have little weight in peak locking"),
     ("edges.contrast", "gain between the cameras is estimated and taken out"),

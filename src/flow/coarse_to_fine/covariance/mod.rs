@@ -10,6 +10,7 @@
 //!   ([`data_support`]), it is extrapolated from other sites.
 //! * Coarse-level error ([`coarse_level_error`]): without texture, or with texture of one direction only
 //!   ([`constrained_directions`]), finer levels do not correct coarser ones.
+//! * Motion boundaries ([`boundary_error`]): a site near one may have the motion of the other side.
 //! * Peak locking ([`PeakLocking`]): a share of the correction may remain.
 //! * Acceleration, three frames only: independent noise, and a share of the acceleration.
 //!
@@ -17,6 +18,7 @@
 //! fitted on synthetic scenes (three carriers, six motions, noise of 0 to 4 grey levels, two and three
 //! frames) and checked on others; `benchmarks/tables/coverage.py` measures the coverage.
 
+mod boundary_error;
 mod coarse_level_error;
 mod constrained_directions;
 mod curvature_bias;
@@ -29,8 +31,10 @@ mod noise;
 use super::estimate::Estimate;
 use super::peak_locking::PeakLocking;
 use super::planes::Planes;
+use crate::ablation::keeps;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
+use boundary_error::boundary_errors;
 use coarse_level_error::{CoarseLevelError, CoarseLevelErrors};
 use constrained_directions::ConstrainedDirections;
 use data_support::DataSupport;
@@ -110,6 +114,11 @@ pub(super) fn covariance<T: SimdReal>(
     let change = change.map(|statistics| {
         Noise::new(statistics, data, energy.times(NEXT_FRAME_ENERGY), true).at_least_as_noisy_as(&noise)
     });
+    let boundary_errors = if keeps("flow.boundary_error") {
+        boundary_errors(&estimate.motion, (width, height))
+    } else {
+        vec![[0.0; 3]; width * height]
+    };
     let complete = |(n, node): (usize, &mut Entries)| {
         let at = (n % width, n / width);
         let motion = curvature_bias::motion_at(&estimate.motion, at);
@@ -124,6 +133,7 @@ pub(super) fn covariance<T: SimdReal>(
         }
         extrapolation.add(node, textured_support.distances(at.0, at.1), statistics.mean_sigmas(at.0, at.1));
         add_coarse_level_error(node, &coarse_errors[n]);
+        add_blocks(node, [1.0, boundary_error::SLOPE_SHARE, boundary_error::SLOPE_SHARE], &boundary_errors[n]);
         add_locking(node, &motion, &estimate.locking);
         if !is_pair {
             add_acceleration(node, &motion);
