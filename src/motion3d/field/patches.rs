@@ -4,7 +4,7 @@ use super::{common_errors, is_within, site_pixels};
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::motion3d::diagnostics::correlated_noise::area;
-use crate::motion3d::model::input::{check_field};
+use crate::motion3d::model::input::check_field;
 use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::patches::AffinePatches;
 use crate::parallel::Threads;
