@@ -62,8 +62,8 @@ pub(super) struct LevelSchedule {
 impl Schedule {
     pub fn new(preset: Preset, frames: usize) -> Self {
         let smoothness = Smoothness::default();
-        // Sweeps are cheap, and remove most of what the few linearisations of a pair leave.
-        let finest_sweeps = if frames == 2 { 6 } else { 4 };
+        // Three frames have less noise than two: another linearisation pays.
+        let (finest_tolerance, finest_sweeps) = if frames == 2 { (0.035, 6) } else { (0.023, 4) };
         match preset {
             Preset::Fast => Self {
                 finest_level: 1,
@@ -81,7 +81,7 @@ impl Schedule {
                 finest_level: 0,
                 iterations: [3, 5, 5],
                 next_frame_iterations: [2, 5, 5],
-                tolerance: [0.023; 2],
+                tolerance: [finest_tolerance, 0.023],
                 smoothness: Smoothness { sweeps: 4, break_strain: 0.14, ..smoothness },
                 finest_sweeps,
                 finest_sharpened: 1,

@@ -22,7 +22,7 @@ const WINDOW: usize = (2 * REACH + 1) * (2 * REACH + 1) / 2 + 1;
 /// Distance, sites, over which second differences of the flow are taken.
 const STEP: usize = 2;
 /// Minimum second difference of the flow beside which medians are tried, px of the level.
-const MIN_SECOND_DIFFERENCE: f64 = 1.0;
+const MIN_SECOND_DIFFERENCE: f64 = 1.5;
 /// Difference of brightness, as a share of its standard deviation, at which a neighbour's weight is a
 /// quarter.
 const BRIGHTNESS_DIFFERENCE: f64 = 0.28;
