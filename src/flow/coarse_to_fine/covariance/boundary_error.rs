@@ -18,8 +18,6 @@ const BOUNDARY_WIDTH: f64 = 8.0;
 const OTHER_SIDE_SHARE: f64 = 0.3;
 /// Variance of slopes over that of the flow, px^-2, for jumps across a strip.
 pub(super) const SLOPE_SHARE: f64 = 1.0 / (BOUNDARY_WIDTH * BOUNDARY_WIDTH);
-/// Passes of the binomial mean over the nodes: 8 px.
-const PASSES: usize = 2;
 
 /// Variances `xx, xy, yy` of the flow, px^2, at every node.
 pub(super) fn boundary_errors<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec<[f64; 3]> {
@@ -40,7 +38,7 @@ pub(super) fn boundary_errors<T: SimdReal>(motion: &Planes<T>, (width, height): 
         sum.map(|sum| sum / weights)
     };
     let mut errors: Vec<[f64; 3]> = (0..width * height).into_par_iter().map(node).collect();
-    (0..PASSES).for_each(|_| binomial_mean(&mut errors, (width, height)));
+    binomial_mean(&mut errors, (width, height));
     errors
 }
 
