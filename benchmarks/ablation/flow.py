@@ -14,6 +14,8 @@ from benchmarks.scenes import disturbed as scenes
 
 SEEDS = (41, 42, 43)
 """Of textures that no rule was chosen on."""
+SPECKED = range(41, 53)
+"""Seeds with saturated pixels: these bias the whole field in about half of the trials only."""
 SHIFTS = ((56, 0), (0, -64), (80, 60))
 
 
@@ -26,7 +28,7 @@ def rows() -> dict[str, list[float]]:
         found["ms"].append(1e3 * (time.process_time() - begun))
     for change, seed in itertools.product(scenes.CHANGES, SEEDS):
         found["changed"].append(error(scenes.changed_pair(seed, (3.3, -1.4), change), (3.3, -1.4)))
-    for seed in SEEDS:
+    for seed in SPECKED:
         clean, spoilt, far = scenes.specks(seed)
         one, other = jacoflow.estimate(clean, threads=1), jacoflow.estimate(spoilt, threads=1)
         found["specks"].append(float(np.mean((np.abs(other.u - one.u) / one.std("u"))[far])))

@@ -42,15 +42,16 @@ fn rubber_whale_in_colour() {
     let refused = place.run(&["flow".to_string(), folder.clone(), "-o".into(), "x".into()]);
     assert!(refused.code != 0 && refused.err.contains("luminance"), "{}", refused.err);
     let frames: Vec<String> = [9, 10, 11].map(|k| format!("{folder}/frame{k:02}.png")).to_vec();
-    let share = to_pictures(&place, &frames, "--luminance --smooth 1 --format npz,flo", 1);
-    // What moves by several pixels contradicts its windows and is not valid.
-    assert!(share > 0.85, "{share}");
+    to_pictures(&place, &frames, "--luminance --smooth 1 --format npz,flo", 1);
     let (got, truth) = (read_flo(place.path("out/000001.flo")), read_flo(format!("{folder}/flow10.flo")));
     let (got, truth) = (got.unwrap(), truth.unwrap());
     let errors: Vec<f64> = (0..got.u().len())
         .map(|i| f64::from(got.u()[i] - truth.u()[i]).hypot(f64::from(got.v()[i] - truth.v()[i])))
         .filter(|e| e.is_finite() && *e < 1e3)
         .collect();
+    // Of all pixels, 1.6 % have no truth. What contradicts its window is not valid, but has an estimate.
+    let known = truth.u().iter().filter(|u| u.abs() < 1e3).count();
+    assert!(errors.len() as f64 > 0.95 * known as f64, "{} of {known}", errors.len());
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     // No motion at all would be 1.26 px off; there is no pyramid here.
     assert!(mean < 0.8, "mean error {mean} px");

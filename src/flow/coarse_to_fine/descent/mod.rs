@@ -1,6 +1,7 @@
 //! Descent through the pyramid: iterations on each level, from the coarsest to the finest.
 //!
-//! `iteration` is one linearisation with its regularised solution, and the unregularised trial;
+//! `weighted_median` sharpens the flow at motion boundaries before an iteration; `iteration` is one
+//! linearisation with its regularised solution, and the unregularised trial;
 //! `block_matches` finds large motions; `comparison` takes the better of two motions at each site;
 //! `intermediate` refines a level before the next one; `given` lets a flow from elsewhere compete.
 
