@@ -3,25 +3,29 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 WHEELS := target/wheels
-# One profile for all that the check builds: crates that it depends on are built once.
+# One profile for all that the check runs: crates that it depends on are built once.
 CI := --profile ci
 # Rust's tests also look for overflow and failed assertions.
 CHECKED := --config profile.ci.package.jacoflow.overflow-checks=true --config profile.ci.package.jacoflow.debug-assertions=true
 
-.PHONY: test of-rust of-python demo format clippy features rustdoc rust-test guide wheel install pytest stubtest typing examples develop docs compare readme ablation clean
+.PHONY: test checks of-rust of-python demo format clippy features rustdoc rust-test guide wheel packages install pytest stubtest typing examples develop docs compare readme ablation clean
 
-# The wheel first, for which Python waits. Then cargo's steps, many of which use one core, beside Python's; each
-# prints when it ends.
-test: format wheel
+# Two steps at a time, each of which often leaves a core idle; each prints when it ends. What is only checked is
+# built in the development profile, whose folder cargo locks apart from that of the wheel.
+test: format $(BIN)/maturin
+	@$(MAKE) --no-print-directory -j2 -Otarget wheel checks
 	@$(MAKE) --no-print-directory -j2 -Otarget of-rust of-python
 	@echo "everything passed"
 
+checks:
+	@for step in typing clippy features rustdoc; do $(MAKE) --no-print-directory $$step || exit 1; done
+
 of-rust:
-	@for step in clippy features rustdoc rust-test guide; do $(MAKE) --no-print-directory $$step || exit 1; done
+	@for step in rust-test guide; do $(MAKE) --no-print-directory $$step || exit 1; done
 
 of-python:
-	@$(MAKE) --no-print-directory -o wheel install
-	@for step in pytest stubtest typing examples; do $(MAKE) --no-print-directory -o install $$step || exit 1; done
+	@$(MAKE) --no-print-directory -o wheel -o packages install
+	@for step in pytest stubtest examples; do $(MAKE) --no-print-directory -o install $$step || exit 1; done
 
 # The main job on an embedded example.
 demo:
@@ -30,19 +34,19 @@ demo:
 format:
 	cargo fmt --check
 
-# Everything with the binding and the published tracker; without them, what is not the same anyway.
+# Everything with the binding and the published tracker; without them, what nothing else uses.
 clippy:
-	cargo clippy -q $(CI) --all-targets --features python,reference -- -D warnings
-	cargo clippy -q $(CI) --lib --bins -- -D warnings
+	cargo clippy -q --all-targets --features python,reference -- -D warnings
+	cargo clippy -q --lib --bins -- -D warnings
 
 # Rooms on their own. Those of one level do not import each other (`tests/layering.rs`): such that need the
 # same crates and lower rooms share a run.
 features:
-	@for rooms in filter,mixture motion3d,segment,stereo synth flow io temporal track; do \
-		cargo check -q $(CI) --no-default-features --features $$rooms || exit 1; done
+	@for rooms in filter,mixture flow,motion3d,segment,stereo synth io temporal track; do \
+		cargo check -q --no-default-features --features $$rooms || exit 1; done
 
 rustdoc:
-	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q $(CI) --no-deps
+	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q --no-deps
 
 # Unit tests have a library of their own, which takes longer to optimise than to run as it is.
 rust-test:
@@ -62,10 +66,14 @@ wheel: $(BIN)/maturin
 	rm -rf $(WHEELS)
 	$(BIN)/maturin build -q $(CI) --out $(WHEELS) -i $(BIN)/python
 
-# The wheel, with what the tests need beside it.
-install: wheel
+# What the package and its tests need beside the wheel.
+packages: $(BIN)/maturin
+	$(BIN)/python -c "import tomllib; p = tomllib.load(open('pyproject.toml', 'rb'))['project']; \
+		print(*p['dependencies'], *p['optional-dependencies']['test'], sep='\n')" > $(VENV)/requirements.txt
+	$(BIN)/python -m pip install -q --no-compile -r $(VENV)/requirements.txt
+
+install: wheel packages
 	$(BIN)/python -m pip install -q --force-reinstall --no-deps $(WHEELS)/jacoflow-*.whl
-	$(BIN)/python -m pip install -q --no-compile "jacoflow[test] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
 
 # One process for each core; files stay whole, so that what a file's tests share is made once.
 pytest: install
@@ -74,7 +82,7 @@ pytest: install
 stubtest: install
 	cd $(VENV) && bin/python -m mypy.stubtest --allowlist $(CURDIR)/tests/stubtest_allowlist.txt jacoflow
 
-typing: install
+typing: packages
 	$(BIN)/python -m mypy --strict python/jacoflow tests/python/test_typing.py
 
 examples: install

@@ -27,6 +27,7 @@ VARIANTS: dict[str, list[str]] = {
     "1 unit": ["package.jacoflow.codegen-units=1"],
     "16 units": ["package.jacoflow.codegen-units=16"],
     "opt-level 2": ["package.jacoflow.opt-level=2"],
+    "opt-level 1": ["package.jacoflow.opt-level=1"],
     "line tables": ["package.jacoflow.debug='line-tables-only'"],
     "rlib too": [],
     "lto thin": ["lto='thin'"],
