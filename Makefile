@@ -1,6 +1,7 @@
 # Verbs for people and for CI. `make test` is the whole check; it needs Rust, Python >= 3.11, gcc and make, nothing else.
 PYTHON ?= python3
 VENV := .venv
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
 BIN := $(VENV)/bin
 WHEELS := target/wheels
 # One profile for all that the check runs: crates that it depends on are built once.
@@ -18,7 +19,7 @@ test: format $(BIN)/maturin
 	@echo "everything passed"
 
 checks:
-	@for step in typing clippy features rustdoc; do $(MAKE) --no-print-directory $$step || exit 1; done
+	@for step in typing clippy features rustdoc; do CARGO_INCREMENTAL=0 $(MAKE) --no-print-directory $$step || exit 1; done
 
 of-rust:
 	@for step in rust-test guide; do $(MAKE) --no-print-directory $$step || exit 1; done

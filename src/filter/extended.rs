@@ -1,9 +1,8 @@
 //! The extended filter: non-linear functions, linearised at the mean (A. H. Jazwinski, "Stochastic Processes
 //! and Filtering Theory", 1970, chapter 8).
 
-use super::state::{GaussianState, check_measurement, expect, finite, shared};
+use super::state::{GaussianState, check_measurement, expect, finite, reach_state};
 use crate::error::Result;
-use std::ops::{Deref, DerefMut};
 
 /// A batch of extended Kalman filters: `x' = f(x) + w`, `z = h(x) + v`.
 ///
@@ -81,16 +80,7 @@ impl ExtendedFilter {
         let mut predicted = vec![0.0; self.batch * m];
         hx(&self.x, &mut predicted)?;
         finite("hx", &predicted)?;
-        for (item, z) in z.chunks_exact(m).enumerate() {
-            if z.iter().any(|v| v.is_nan()) {
-                self.state.skip(item);
-                continue;
-            }
-            let y: Vec<f64> = z.iter().zip(&predicted[item * m..]).map(|(z, p)| z - p).collect();
-            let r = shared(&self.state.R, item, m * m).to_vec();
-            self.state.joseph_update(item, &y, &h[item * m * n..(item + 1) * m * n], &r)?;
-        }
-        Ok(())
+        self.state.update_all(z, &predicted, &h)
     }
 
     /// As [`update`](Self::update), with the Jacobian by central differences.
@@ -141,14 +131,4 @@ impl ExtendedFilter {
     }
 }
 
-impl Deref for ExtendedFilter {
-    type Target = GaussianState;
-    fn deref(&self) -> &GaussianState {
-        &self.state
-    }
-}
-impl DerefMut for ExtendedFilter {
-    fn deref_mut(&mut self) -> &mut GaussianState {
-        &mut self.state
-    }
-}
+reach_state!(ExtendedFilter);

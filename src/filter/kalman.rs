@@ -1,9 +1,8 @@
 //! The linear filter (R. E. Kalman, "A new approach to linear filtering and prediction problems", 1960).
 
-use super::state::{GaussianState, check_matrix, check_measurement, expect, shared};
+use super::state::{GaussianState, check_matrix, check_measurement, expect, reach_state, shared};
 use crate::error::Result;
 use crate::math::dense::multiply;
-use std::ops::{Deref, DerefMut};
 
 /// A batch of linear Kalman filters: `x' = F x + w`, `z = H x + v`, `w ~ N(0, Q)`, `v ~ N(0, R)`.
 ///
@@ -62,30 +61,12 @@ impl KalmanFilter {
         expect("H", &self.H, &[m * n, self.batch * m * n])?;
         check_matrix("H", &self.H)?;
         check_measurement(z)?;
-        let mut predicted = vec![0.0; m];
-        for (item, z) in z.chunks_exact(m).enumerate() {
-            if z.iter().any(|v| v.is_nan()) {
-                self.state.skip(item);
-                continue;
-            }
-            let h = shared(&self.H, item, m * n);
-            multiply(h, &self.state.x[item * n..(item + 1) * n], n, &mut predicted);
-            let y: Vec<f64> = z.iter().zip(&predicted).map(|(z, p)| z - p).collect();
-            let r = shared(&self.state.R, item, m * m).to_vec();
-            self.state.joseph_update(item, &y, h, &r)?;
+        let mut predicted = vec![0.0; self.batch * m];
+        for (item, predicted) in predicted.chunks_exact_mut(m).enumerate() {
+            multiply(shared(&self.H, item, m * n), &self.state.x[item * n..(item + 1) * n], n, predicted);
         }
-        Ok(())
+        self.state.update_all(z, &predicted, &self.H)
     }
 }
 
-impl Deref for KalmanFilter {
-    type Target = GaussianState;
-    fn deref(&self) -> &GaussianState {
-        &self.state
-    }
-}
-impl DerefMut for KalmanFilter {
-    fn deref_mut(&mut self) -> &mut GaussianState {
-        &mut self.state
-    }
-}
+reach_state!(KalmanFilter);

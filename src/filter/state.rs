@@ -148,6 +148,22 @@ impl GaussianState {
         self.keep_sound(item)
     }
 
+    /// Takes in the measurements `z` `(B, m)`, predicted as these and by `h`, `(m, n)` or `(B, m, n)`; skips
+    /// states with a NaN among their numbers.
+    pub(super) fn update_all(&mut self, z: &[f64], predicted: &[f64], h: &[f64]) -> Result<()> {
+        let (n, m) = (self.dim_x, self.dim_z);
+        for (item, (z, predicted)) in z.chunks_exact(m).zip(predicted.chunks_exact(m)).enumerate() {
+            if z.iter().any(|v| v.is_nan()) {
+                self.skip(item);
+                continue;
+            }
+            let y: Vec<f64> = z.iter().zip(predicted).map(|(z, p)| z - p).collect();
+            let r = shared(&self.R, item, m * m).to_vec();
+            self.joseph_update(item, &y, shared(h, item, m * n), &r)?;
+        }
+        Ok(())
+    }
+
     /// Clears the by-products of a state whose measurement is missing.
     pub(super) fn skip(&mut self, item: usize) {
         let (n, m) = (self.dim_x, self.dim_z);
@@ -206,10 +222,7 @@ fn check_batch(batch: usize, n: usize, m: usize) -> Result<()> {
 /// # Errors
 /// [`Error::Argument`] naming `x`.
 pub(crate) fn check_mean(x: &[f64]) -> Result<()> {
-    match x.iter().find(|v| !v.is_finite()) {
-        Some(value) => Err(Error::argument("x", "finite numbers", value)),
-        None => Ok(()),
-    }
+    refuse("x", x, |v| !v.is_finite(), "finite numbers")
 }
 
 /// Refuses `(n, n)` matrices that are not finite, symmetric and positive semi-definite to rounding.
@@ -225,18 +238,12 @@ pub(crate) fn check_covariances(name: &'static str, values: &[f64], n: usize) ->
 
 /// Refuses a measurement that is infinite; NaN stands for a missing one.
 pub(super) fn check_measurement(z: &[f64]) -> Result<()> {
-    match z.iter().find(|v| v.is_infinite()) {
-        Some(value) => Err(Error::argument("z", "finite numbers, or NaN where one is missing", value)),
-        None => Ok(()),
-    }
+    refuse("z", z, f64::is_infinite, "finite numbers, or NaN where one is missing")
 }
 
 /// Refuses a matrix with an entry that is not finite.
 pub(super) fn check_matrix(name: &'static str, values: &[f64]) -> Result<()> {
-    match values.iter().find(|v| !v.is_finite()) {
-        Some(value) => Err(Error::argument(name, "a matrix of finite numbers", value)),
-        None => Ok(()),
-    }
+    refuse(name, values, |v| !v.is_finite(), "a matrix of finite numbers")
 }
 
 /// The part of `values` that belongs to `item`: `values` has `size` values for all, or `size` for each.
@@ -257,8 +264,30 @@ pub(super) fn expect(name: &'static str, values: &[f64], lengths: &[usize]) -> R
 
 /// Refuses a callback's result that holds NaN or infinity, which would spread silently.
 pub(super) fn finite(name: &'static str, values: &[f64]) -> Result<()> {
-    match values.iter().find(|v| !v.is_finite()) {
-        Some(value) => Err(Error::argument(name, "a function with finite results", value)),
+    refuse(name, values, |v| !v.is_finite(), "a function with finite results")
+}
+
+fn refuse(name: &'static str, values: &[f64], is_wrong: fn(f64) -> bool, expected: &'static str) -> Result<()> {
+    match values.iter().find(|v| is_wrong(**v)) {
+        Some(value) => Err(Error::argument(name, expected, value)),
         None => Ok(()),
     }
 }
+
+/// The fields of the state are reached from the filter directly.
+macro_rules! reach_state {
+    ($filter:ty) => {
+        impl std::ops::Deref for $filter {
+            type Target = GaussianState;
+            fn deref(&self) -> &GaussianState {
+                &self.state
+            }
+        }
+        impl std::ops::DerefMut for $filter {
+            fn deref_mut(&mut self) -> &mut GaussianState {
+                &mut self.state
+            }
+        }
+    };
+}
+pub(super) use reach_state;

@@ -1,10 +1,9 @@
 //! The unscented filter (S. Julier, J. Uhlmann, "Unscented filtering and nonlinear estimation", 2004).
 
 use super::sigma_points::SigmaPoints;
-use super::state::{GaussianState, check_measurement, expect, finite, shared};
+use super::state::{GaussianState, check_measurement, expect, finite, reach_state, shared};
 use crate::error::{Error, Result};
 use crate::math::dense::{cholesky, solve, symmetrise};
-use std::ops::{Deref, DerefMut};
 
 /// A batch of unscented Kalman filters: `x' = f(x) + w` (or `f(x, w)`), `z = h(x) + v`.
 ///
@@ -217,14 +216,4 @@ fn semidefinite_root(q: &[f64], n: usize) -> Result<Vec<f64>> {
     Ok(out)
 }
 
-impl Deref for UnscentedFilter {
-    type Target = GaussianState;
-    fn deref(&self) -> &GaussianState {
-        &self.state
-    }
-}
-impl DerefMut for UnscentedFilter {
-    fn deref_mut(&mut self) -> &mut GaussianState {
-        &mut self.state
-    }
-}
+reach_state!(UnscentedFilter);

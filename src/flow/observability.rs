@@ -27,19 +27,6 @@ pub enum Condition {
     Degenerate = 4,
 }
 
-impl Condition {
-    /// The word used in files and in Python.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Neither => "neither",
-            Self::RegularHessian => "regular_hessian",
-            Self::TurningGradient => "turning_gradient",
-            Self::Both => "both",
-            Self::Degenerate => "degenerate",
-        }
-    }
-}
-
 /// Theorem 1 at one pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observability {

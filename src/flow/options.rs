@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{Frame, Mask, SamplingGrid};
+use crate::types::{Frame, Mask, SamplingGrid, choices};
 use std::sync::Arc;
 
 /// Report where the equations do not determine every unknown.
@@ -16,27 +16,7 @@ pub enum RankPolicy {
     MinNorm,
 }
 
-impl RankPolicy {
-    /// The policy called `name`: `nan` or `min_norm`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming `rank_deficient` for another word.
-    pub fn parse(name: &str) -> Result<Self> {
-        match name {
-            "nan" => Ok(Self::Nan),
-            "min_norm" => Ok(Self::MinNorm),
-            other => Err(Error::argument("rank_deficient", "nan or min_norm", other)),
-        }
-    }
-
-    /// The policy's name, as [`RankPolicy::parse`] takes it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Nan => "nan",
-            Self::MinNorm => "min_norm",
-        }
-    }
-}
+choices!(RankPolicy, "rank_deficient": Nan "nan", MinNorm "min_norm");
 
 /// A flow from elsewhere that an estimate starts from, px/frame; NaN where it is unknown.
 #[derive(Debug, Clone, PartialEq)]

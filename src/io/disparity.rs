@@ -5,7 +5,7 @@ use super::npz::{NpzReader, NpzWriter};
 use super::pfm::{FloatMap, read_pfm, write_pfm};
 use super::write::atomic;
 use crate::error::{Error, Result};
-use crate::types::Frame;
+use crate::types::{Frame, choices};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -26,35 +26,15 @@ pub enum DisparityFormat {
     Kitti,
 }
 
+choices!(DisparityFormat, "format": Npz "npz", Pfm "pfm", Kitti "kitti");
+
 impl DisparityFormat {
-    /// Every format.
-    pub const ALL: [Self; 3] = [Self::Npz, Self::Pfm, Self::Kitti];
-
-    /// The word on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Npz => "npz",
-            Self::Pfm => "pfm",
-            Self::Kitti => "kitti",
-        }
-    }
-
     /// The extension of its files.
     pub fn extension(self) -> &'static str {
         match self {
-            Self::Npz => "npz",
-            Self::Pfm => "pfm",
             Self::Kitti => "png",
+            other => other.name(),
         }
-    }
-
-    /// The format of this name.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] named `format` for another word.
-    pub fn parse(name: &str) -> Result<Self> {
-        let known = Self::ALL.into_iter().find(|format| format.name() == name);
-        known.ok_or_else(|| Error::argument("format", "npz, pfm or kitti", format!("{name:?}")))
     }
 
     /// The format that a file's extension means.

@@ -2,9 +2,9 @@
 
 use super::npy::Element;
 use super::{FloatMap, FlowImage, write_flo, write_kitti, write_npz, write_pfm};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::math::Real;
-use crate::types::FlowField;
+use crate::types::{FlowField, choices};
 use std::path::Path;
 
 /// A file format for one flow field.
@@ -20,37 +20,15 @@ pub enum FieldFormat {
     Pfm,
 }
 
+choices!(FieldFormat, "format": Npz "npz", Flo "flo", Kitti "kitti", Pfm "pfm");
+
 impl FieldFormat {
-    /// Every format.
-    pub const ALL: [Self; 4] = [Self::Npz, Self::Flo, Self::Kitti, Self::Pfm];
-
-    /// The format's name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Npz => "npz",
-            Self::Flo => "flo",
-            Self::Kitti => "kitti",
-            Self::Pfm => "pfm",
-        }
-    }
-
     /// Its files' extension.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Kitti => "png",
             other => other.name(),
         }
-    }
-
-    /// The format called `name`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] named `format` for another word.
-    pub fn parse(name: &str) -> Result<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|f| f.name() == name)
-            .ok_or_else(|| Error::argument("format", format!("one of {}", Self::ALL.map(Self::name).join(", ")), name))
     }
 
     /// Writes a field. `options` says how it was made, where the format has room for it.

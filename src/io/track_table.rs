@@ -72,27 +72,18 @@ impl TrackTable {
         NUMBERS.into_iter().map(String::from).chain(covariance).collect()
     }
 
-    /// Begins a table in a file, or on standard output for `-`.
-    pub fn create(path: impl AsRef<Path>) -> Result<Self> {
-        Ok(Self { table: TableWriter::create(path, &Self::columns())? })
-    }
-
-    /// As [`TrackTable::create`], with further columns after the others.
-    pub fn create_with(path: impl AsRef<Path>, further: &[&str]) -> Result<Self> {
+    /// Begins a table in a file, or on standard output for `-`, with `further` columns after the others.
+    pub fn create(path: impl AsRef<Path>, further: &[&str]) -> Result<Self> {
         let columns: Vec<String> = Self::columns().into_iter().chain(further.iter().map(ToString::to_string)).collect();
         Ok(Self { table: TableWriter::create(path, &columns)? })
     }
 
-    /// Adds the row of target `target` (from 1) at a frame of the input, and its time, s, if known.
+    /// Adds the row of target `target` (from 1) at a frame of the input, and its time, s, if known, with a cell
+    /// for each further column.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io) when it cannot be written.
-    pub fn write(&mut self, target: usize, place: (usize, Option<f64>), state: &TrackState) -> Result<()> {
-        self.write_with(target, place, state, &[])
-    }
-
-    /// As [`TrackTable::write`], with a cell for each further column.
-    pub fn write_with(
+    pub fn write(
         &mut self,
         target: usize,
         (frame, time): (usize, Option<f64>),

@@ -126,11 +126,6 @@ impl AtomicFile {
         Ok(Self { target, inner: BufWriter::with_capacity(1 << 16, inner) })
     }
 
-    /// The final name.
-    pub fn path(&self) -> &Path {
-        &self.target
-    }
-
     /// Gives the file its final name, replacing what was there.
     ///
     /// # Errors

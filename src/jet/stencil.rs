@@ -40,7 +40,6 @@ impl Reach {
 /// ex^2/2, ex ey, ey^2/2]`. Derivatives are per px, or per unit of the pixel pitch.
 #[derive(Debug, Clone)]
 pub struct JetStencil {
-    neighbourhood: Neighbourhood,
     pitch: (f64, f64),
     offsets: Vec<(i32, i32)>,
     weights: Vec<[f64; 6]>,
@@ -83,17 +82,9 @@ impl JetStencil {
         };
         let most = |f: &dyn Fn(&(i32, i32)) -> i32| offsets.iter().map(f).max().unwrap_or(0).max(0) as usize;
         let reach = Reach { left: most(&|p| -p.0), right: most(&|p| p.0), up: most(&|p| -p.1), down: most(&|p| p.1) };
-        Ok(Self { neighbourhood: neighbourhood.clone(), pitch, offsets, weights, covariance, freedom, reach, axes })
+        Ok(Self { pitch, offsets, weights, covariance, freedom, reach, axes })
     }
 
-    /// The neighbourhood that this is the stencil of.
-    pub fn neighbourhood(&self) -> &Neighbourhood {
-        &self.neighbourhood
-    }
-    /// The pixel pitch `(dx, dy)` that derivatives refer to.
-    pub fn pitch(&self) -> (f64, f64) {
-        self.pitch
-    }
     /// How far the neighbourhood reaches from its site.
     pub fn reach(&self) -> Reach {
         self.reach

@@ -1,7 +1,7 @@
 //! Time differences of jets: the two schemes.
 
-use crate::error::{Error, Result};
 use crate::math::Real;
+use crate::types::choices;
 
 /// How the first and second time derivative are taken from three jets, and to which frame they belong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -25,27 +25,9 @@ pub struct JetRates<T> {
     pub second: [T; 6],
 }
 
+choices!(TimeScheme, "scheme": Central "central", Backward "backward");
+
 impl TimeScheme {
-    /// The scheme called `name`: `central` or `backward`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming `scheme` for another word.
-    pub fn parse(name: &str) -> Result<Self> {
-        match name {
-            "central" => Ok(Self::Central),
-            "backward" => Ok(Self::Backward),
-            other => Err(Error::argument("scheme", "central or backward", other)),
-        }
-    }
-
-    /// The scheme's name, as [`TimeScheme::parse`] takes it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Central => "central",
-            Self::Backward => "backward",
-        }
-    }
-
     /// Which of three frames, oldest first, the estimate belongs to.
     pub fn frame(self) -> usize {
         match self {

@@ -3,7 +3,7 @@
 use super::sink::TableTarget;
 use crate::error::{Error, Result};
 use crate::io::FieldFormat;
-use crate::types::SamplingGrid;
+use crate::types::{SamplingGrid, choice_by_name, choices};
 use std::path::{Path, PathBuf};
 
 /// A picture of one field, PNG.
@@ -19,30 +19,16 @@ pub enum PictureKind {
     Curl,
 }
 
+choices!(PictureKind: Colour "colour", Quiver "quiver", Divergence "divergence", Curl "curl");
+
 impl PictureKind {
-    /// Every kind.
-    pub const ALL: [Self; 4] = [Self::Colour, Self::Quiver, Self::Divergence, Self::Curl];
-
-    /// The kind's word, also the end of its files' names.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Colour => "colour",
-            Self::Quiver => "quiver",
-            Self::Divergence => "divergence",
-            Self::Curl => "curl",
-        }
-    }
-
     /// The kind called `name` (`color` is understood too).
     ///
     /// # Errors
     /// [`Error::Argument`] listing the known names.
     pub fn parse(name: &str) -> Result<Self> {
         let wanted = if name == "color" { "colour" } else { name };
-        Self::ALL
-            .into_iter()
-            .find(|kind| kind.name() == wanted)
-            .ok_or_else(|| Error::argument("picture", format!("one of {}", Self::ALL.map(Self::name).join(", ")), name))
+        choice_by_name("picture", wanted, &Self::ALL, Self::name)
     }
 }
 

@@ -70,10 +70,6 @@ impl<T: SimdReal> FilterStage<T> {
     pub fn options(&self) -> &FlowFilterOptions {
         &self.options
     }
-    /// The filter, once there is one.
-    pub fn filter(&self) -> Option<&FlowFilter<T>> {
-        self.filter.as_ref()
-    }
 }
 
 impl<T: SimdReal + Element> Stage<T> for FilterStage<T> {

@@ -1,6 +1,7 @@
 //! What the texts that a run can write have in common.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
+use crate::types::choice_by_name;
 
 /// The kinds of text that one kind of result is written as; the first is the default.
 pub trait TextFormat: Copy + PartialEq + 'static {
@@ -18,10 +19,6 @@ pub trait TextFormat: Copy + PartialEq + 'static {
     /// # Errors
     /// [`Error::Argument`] named `format`.
     fn parse(name: &str) -> Result<Self> {
-        let known = Self::ALL.iter().copied().find(|format| format.name() == name);
-        known.ok_or_else(|| {
-            let names: Vec<_> = Self::ALL.iter().map(|format| format.name()).collect();
-            Error::argument("format", names.join(" or "), name)
-        })
+        choice_by_name("format", name, Self::ALL, Self::name)
     }
 }

@@ -10,7 +10,7 @@ use crate::synth::registry::{CARRIERS, Parameter, SCENES};
 use crate::synth::{Rounding, Scene as CoreScene, SceneOptions, Sensor as CoreSensor, build, mean_truth, truth};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{IntoPyDict, PyDict, PyTuple};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A moving picture I(x, y, t) with exact flow and Jacobian at every point and time.
@@ -279,21 +279,13 @@ fn hash(value: &impl Hash) -> u64 {
 /// Names of the scenes, with one line about each: a dictionary.
 #[pyfunction(name = "_scene_names")]
 pub fn scene_names(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-    let all = PyDict::new(py);
-    for kind in SCENES {
-        all.set_item(kind.name, kind.summary)?;
-    }
-    Ok(all)
+    SCENES.iter().map(|kind| (kind.name, kind.summary)).into_py_dict(py)
 }
 
 /// Names of what a motion can carry, with one line about each: a dictionary. The first is the default.
 #[pyfunction(name = "_scene_carriers")]
 pub fn scene_carriers(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-    let all = PyDict::new(py);
-    for kind in CARRIERS {
-        all.set_item(kind.name, kind.summary)?;
-    }
-    Ok(all)
+    CARRIERS.iter().map(|kind| (kind.name, kind.summary)).into_py_dict(py)
 }
 
 /// Parameters of the scene or carrier `name`: a dictionary from the parameter's name to (default or None,
@@ -309,9 +301,5 @@ pub fn scene_parameters<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py,
         let names: Vec<_> = known.iter().map(|(name, _)| *name).collect();
         return Err(Error::argument("name", format!("one of {}", names.join(", ")), format!("{name:?}")).into());
     };
-    let all = PyDict::new(py);
-    for parameter in *parameters {
-        all.set_item(parameter.name, (parameter.default, parameter.meaning))?;
-    }
-    Ok(all)
+    parameters.iter().map(|parameter| (parameter.name, (parameter.default, parameter.meaning))).into_py_dict(py)
 }

@@ -8,7 +8,7 @@ use crate::python::keywords::getters;
 use crate::synth::targets::{SCENES, TargetScene as CoreScene, TargetSceneOptions};
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{IntoPyDict, PyDict, PyTuple};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with
@@ -169,9 +169,5 @@ impl TargetScene {
 /// Names of the scenes of targets, with one line about each: a dictionary.
 #[pyfunction(name = "_target_scene_names")]
 pub fn target_scene_names(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-    let all = PyDict::new(py);
-    for kind in SCENES {
-        all.set_item(kind.name, kind.summary)?;
-    }
-    Ok(all)
+    SCENES.iter().map(|kind| (kind.name, kind.summary)).into_py_dict(py)
 }

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
-use crate::types::Frame;
+use crate::types::{Frame, choices};
 
 /// Smallest side of a view, px: the window of the gradient.
 pub const MIN_VIEW_SIDE: usize = 17;
@@ -23,27 +23,7 @@ pub enum Method {
     SemiGlobal,
 }
 
-impl Method {
-    /// Every method.
-    pub const ALL: [Self; 2] = [Self::Classes, Self::SemiGlobal];
-
-    /// The word used in Python and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Classes => "classes",
-            Self::SemiGlobal => "sgm",
-        }
-    }
-
-    /// The method of this name.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] named `method` for another word.
-    pub fn parse(name: &str) -> Result<Self> {
-        let known = Self::ALL.into_iter().find(|method| method.name() == name);
-        known.ok_or_else(|| Error::argument("method", "\"classes\" or \"sgm\"", format!("{name:?}")))
-    }
-}
+choices!(Method, "method": Classes "classes", SemiGlobal "sgm");
 
 /// Options of [`edge_disparity`](super::edge_disparity) and
 /// [`estimate_row_offset`](super::estimate_row_offset). Grey levels are those of 8 bit.

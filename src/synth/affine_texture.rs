@@ -22,7 +22,7 @@ impl AffineTexture {
     /// The same motion of a noise of one's own.
     pub fn with_noise(size: (usize, usize), motion: [f64; 6], noise: Noise) -> Self {
         let centre = ((size.0 as f64 - 1.0) / 2.0, (size.1 as f64 - 1.0) / 2.0);
-        Carried::new("affine", size, noise, AffineField::new(motion, centre))
+        Carried::new(size, noise, AffineField::new(motion, centre))
     }
 
     /// The settings that the estimators' accuracy is quoted for: `M = [[0.01, -0.02], [0.02, 0.01]]`, `(u, v)

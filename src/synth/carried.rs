@@ -11,8 +11,6 @@ use crate::types::{AffineFlow, Frame};
 /// Brightness is constant along every path, exactly: `I_t + u I_x + v I_y = 0`.
 #[derive(Debug, Clone)]
 pub struct Carried<X, M> {
-    /// The scene's name.
-    pub name: &'static str,
     /// `(width, height)` of a frame, px.
     pub size: (usize, usize),
     /// Scene coordinates of pixel (0, 0), px.
@@ -25,15 +23,12 @@ pub struct Carried<X, M> {
 
 impl<X: Texture, M: Motion> Carried<X, M> {
     /// `texture` carried by `motion`, seen through a window whose pixel (0, 0) is the scene's (0, 0).
-    pub fn new(name: &'static str, size: (usize, usize), texture: X, motion: M) -> Self {
-        Self { name, size, origin: (0.0, 0.0), texture, motion }
+    pub fn new(size: (usize, usize), texture: X, motion: M) -> Self {
+        Self { size, origin: (0.0, 0.0), texture, motion }
     }
 }
 
 impl<X: Texture, M: Motion> Scene for Carried<X, M> {
-    fn name(&self) -> &'static str {
-        self.name
-    }
     fn size(&self) -> (usize, usize) {
         self.size
     }

@@ -58,9 +58,6 @@ impl<X: Texture> RotatingDisc<X> {
 }
 
 impl<X: Texture> Scene for RotatingDisc<X> {
-    fn name(&self) -> &'static str {
-        "disc"
-    }
     fn size(&self) -> (usize, usize) {
         self.size
     }

@@ -59,7 +59,6 @@ impl ParticleLook {
 /// centres of particles, not for every pixel.
 #[derive(Debug, Clone)]
 pub struct ParticleImages<M> {
-    name: &'static str,
     size: (usize, usize),
     origin: (f64, f64),
     look: ParticleLook,
@@ -84,12 +83,7 @@ impl<M: Motion> ParticleImages<M> {
         look.check()?;
         let rng = CounterRng::new(seed);
         // One particle a cell on average.
-        Ok(Self { name: "particles", size, origin, look, motion, cell: look.density.sqrt().recip(), rng })
-    }
-
-    /// The same scene under another name.
-    pub fn named(self, name: &'static str) -> Self {
-        Self { name, ..self }
+        Ok(Self { size, origin, look, motion, cell: look.density.sqrt().recip(), rng })
     }
 
     /// The particles that reach into a rectangle at time `t`, in an order that does not depend on it.
@@ -159,9 +153,6 @@ impl<M: Motion> ParticleImages<M> {
 }
 
 impl<M: Motion> Scene for ParticleImages<M> {
-    fn name(&self) -> &'static str {
-        self.name
-    }
     fn size(&self) -> (usize, usize) {
         self.size
     }

@@ -43,9 +43,6 @@ impl RotatingRamp {
 }
 
 impl Scene for RotatingRamp {
-    fn name(&self) -> &'static str {
-        "ramp"
-    }
     fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }

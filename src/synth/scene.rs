@@ -8,9 +8,6 @@ use crate::types::{AffineFlow, Frame};
 /// Coordinates `(x, y)` are scene coordinates in px, x right and y down; pixel `(column, row)` of a frame
 /// lies at `origin + (column, row)`. Time `t` is in frames.
 pub trait Scene: Send + Sync {
-    /// The scene's name in the registry.
-    fn name(&self) -> &'static str;
-
     /// `(width, height)` of its frames, px.
     fn size(&self) -> (usize, usize);
 

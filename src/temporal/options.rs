@@ -5,7 +5,7 @@ use crate::filter::SigmaPoints;
 use crate::jet::Neighbourhood;
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{Mask, SamplingGrid};
+use crate::types::{Mask, SamplingGrid, choices};
 use serde::{Deserialize, Serialize};
 
 /// How the non-linear prediction is carried out.
@@ -26,31 +26,12 @@ pub enum FilterForm {
     Extended,
 }
 
-impl FilterForm {
-    /// Every form.
-    pub const ALL: [Self; 4] = [Self::Augmented, Self::NonAugmented, Self::Fast, Self::Extended];
-
-    /// The word used in files, on the command line and in Python.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Augmented => "augmented",
-            Self::NonAugmented => "non_augmented",
-            Self::Fast => "fast",
-            Self::Extended => "extended",
-        }
-    }
-
-    /// The form called `name`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] listing the known names.
-    pub fn parse(name: &str) -> Result<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|f| f.name() == name)
-            .ok_or_else(|| Error::argument("form", format!("one of {}", Self::ALL.map(Self::name).join(", ")), name))
-    }
-}
+choices!(FilterForm, "form":
+    Augmented "augmented",
+    NonAugmented "non_augmented",
+    Fast "fast",
+    Extended "extended",
+);
 
 /// How a state moves over one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
@@ -63,28 +44,7 @@ pub enum Transition {
     Exact,
 }
 
-impl Transition {
-    /// Every transition.
-    pub const ALL: [Self; 2] = [Self::Rk4, Self::Exact];
-
-    /// The word used in files, on the command line and in Python.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Rk4 => "rk4",
-            Self::Exact => "exact",
-        }
-    }
-
-    /// The transition called `name`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] listing the known names.
-    pub fn parse(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|t| t.name() == name).ok_or_else(|| {
-            Error::argument("transition", format!("one of {}", Self::ALL.map(Self::name).join(", ")), name)
-        })
-    }
-}
+choices!(Transition, "transition": Rk4 "rk4", Exact "exact");
 
 /// In which order the Cholesky factor that spreads the sigma points takes the state.
 ///
@@ -105,28 +65,7 @@ pub enum SquareRoot {
     MotionFirst,
 }
 
-impl SquareRoot {
-    /// Both orders.
-    pub const ALL: [Self; 2] = [Self::BrightnessFirst, Self::MotionFirst];
-
-    /// The word used in files, on the command line and in Python.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::BrightnessFirst => "brightness_first",
-            Self::MotionFirst => "motion_first",
-        }
-    }
-
-    /// The order called `name`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] listing the known names.
-    pub fn parse(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|r| r.name() == name).ok_or_else(|| {
-            Error::argument("square_root", format!("one of {}", Self::ALL.map(Self::name).join(", ")), name)
-        })
-    }
-}
+choices!(SquareRoot, "square_root": BrightnessFirst "brightness_first", MotionFirst "motion_first");
 
 /// Options of [`FlowFilter`](super::FlowFilter). The default is [`FlowFilterOptions::patent`].
 ///

@@ -6,9 +6,6 @@ use crate::types::{Frame, TrackState};
 /// A tracker of one target. It is deterministic, keeps bounded memory and shares nothing with others: several
 /// targets are several trackers.
 pub trait Tracker: Send {
-    /// Name of the method, as in [`crate::track`]'s registry.
-    fn method(&self) -> &'static str;
-
     /// The target in the next frame. Frames that cannot be used (any sample that is not finite) count as
     /// frames in which the target was not seen.
     ///

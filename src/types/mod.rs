@@ -1,6 +1,7 @@
 //! Plain data: cameras, frames, masks, regions, flow fields. No algorithms.
 
 mod camera;
+mod choice;
 mod field;
 mod frame;
 mod motion;
@@ -10,6 +11,7 @@ mod status;
 mod track;
 
 pub use camera::Intrinsics;
+pub(crate) use choice::{choice_by_name, choices};
 pub use field::{FieldLayout, FlowField};
 pub use frame::{AnyColourFrame, AnyFrame, ColourFrame, Frame, Mask, Sample};
 pub use motion::{AffineFlow, MOTION_NAMES};

@@ -1,5 +1,7 @@
 //! Why a pixel has, or lacks, an estimate.
 
+use super::choices;
+
 /// The state of one estimate. `Border`, `NonFinite`, `Masked` and `Unobservable` come with NaN values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 #[repr(u8)]
@@ -27,35 +29,19 @@ pub enum Status {
     Inconsistent = 8,
 }
 
+choices!(Status:
+    Ok "ok",
+    Border "border",
+    NonFinite "non_finite",
+    Masked "masked",
+    Unobservable "unobservable",
+    MinNorm "min_norm",
+    Repaired "repaired",
+    Predicted "predicted",
+    Inconsistent "inconsistent",
+);
+
 impl Status {
-    /// Every status, by code.
-    pub const ALL: [Self; 9] = [
-        Self::Ok,
-        Self::Border,
-        Self::NonFinite,
-        Self::Masked,
-        Self::Unobservable,
-        Self::MinNorm,
-        Self::Repaired,
-        Self::Predicted,
-        Self::Inconsistent,
-    ];
-
-    /// The word used in files and in Python.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::Border => "border",
-            Self::NonFinite => "non_finite",
-            Self::Masked => "masked",
-            Self::Unobservable => "unobservable",
-            Self::MinNorm => "min_norm",
-            Self::Repaired => "repaired",
-            Self::Predicted => "predicted",
-            Self::Inconsistent => "inconsistent",
-        }
-    }
-
     /// The status with this code.
     pub fn from_code(code: u8) -> Option<Self> {
         Self::ALL.get(code as usize).copied()

@@ -1,5 +1,7 @@
 //! State of a tracked target, frame by frame.
 
+use super::choices;
+
 /// A rectangle with real sides, px: its upper left corner is `(x, y)`, pixel centres lie at integers, so that
 /// its centre is `(x + width / 2, y + height / 2)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,21 +55,9 @@ pub enum TrackStatus {
     Lost = 4,
 }
 
+choices!(TrackStatus: Tracking "tracking", Occluded "occluded", Coasting "coasting", Out "out", Lost "lost");
+
 impl TrackStatus {
-    /// Every status, by code.
-    pub const ALL: [Self; 5] = [Self::Tracking, Self::Occluded, Self::Coasting, Self::Out, Self::Lost];
-
-    /// The word used in files and in Python.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tracking => "tracking",
-            Self::Occluded => "occluded",
-            Self::Coasting => "coasting",
-            Self::Out => "out",
-            Self::Lost => "lost",
-        }
-    }
-
     /// Whether this frame's picture of the target was measured.
     pub fn is_measured(self) -> bool {
         matches!(self, Self::Tracking | Self::Occluded)

@@ -35,8 +35,8 @@ fn numbered() -> TrackState {
 fn every_number_stands_under_its_name() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.csv");
-    let mut table = TrackTable::create(&path).unwrap();
-    table.write(2, (31, Some(1.24)), &numbered()).unwrap();
+    let mut table = TrackTable::create(&path, &[]).unwrap();
+    table.write(2, (31, Some(1.24)), &numbered(), &[]).unwrap();
     table.flush().unwrap();
     assert!(!path.exists());
     table.finish().unwrap();
@@ -83,8 +83,8 @@ fn every_number_stands_under_its_name() {
 fn further_columns_come_last() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("t.csv");
-    let mut table = TrackTable::create_with(&path, &["similarity"]).unwrap();
-    table.write_with(1, (0, None), &numbered(), &[cell(0.25)]).unwrap();
+    let mut table = TrackTable::create(&path, &["similarity"]).unwrap();
+    table.write(1, (0, None), &numbered(), &[cell(0.25)]).unwrap();
     table.finish().unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let lines: Vec<&str> = text.lines().collect();
@@ -94,10 +94,10 @@ fn further_columns_come_last() {
 #[test]
 fn rows_of_a_run_that_was_stopped_have_another_name() {
     let folder = tempfile::tempdir().unwrap();
-    let mut table = TrackTable::create(folder.path().join("t.csv")).unwrap();
-    table.write(1, (0, None), &numbered()).unwrap();
+    let mut table = TrackTable::create(folder.path().join("t.csv"), &[]).unwrap();
+    table.write(1, (0, None), &numbered(), &[]).unwrap();
     table.finish_as(folder.path().join("part.csv")).unwrap();
-    drop(TrackTable::create(folder.path().join("u.csv")).unwrap());
+    drop(TrackTable::create(folder.path().join("u.csv"), &[]).unwrap());
     let names: Vec<_> = folder.path().read_dir().unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(names, ["part.csv"]);
 }

@@ -44,7 +44,7 @@ fn truth_is_consistent(scene: &dyn Scene, x: f64, y: f64, t: f64) {
         return;
     };
     let close = |got: f64, want: f64, what: &str| {
-        assert!((got - want).abs() < 1e-5 * (1.0 + want.abs()), "{} {what} at ({x}, {y}): {got}, {want}", scene.name());
+        assert!((got - want).abs() < 1e-5 * (1.0 + want.abs()), "{what} at ({x}, {y}): {got}, {want}");
     };
     close((there.0 - back.0) / (2.0 * h), m.u, "u");
     close((there.1 - back.1) / (2.0 * h), m.v, "v");

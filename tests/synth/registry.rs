@@ -28,7 +28,7 @@ fn every_scene_with_every_carrier_makes_finite_moving_frames_with_truth() {
                 }
                 Err(error) => panic!("{}: {error}", kind.name),
             };
-            assert_eq!((scene.name(), scene.size()), (kind.name, (40, 32)));
+            assert_eq!(scene.size(), (40, 32));
             let (first, second) = (scene.frame(0.0), scene.frame(1.0));
             assert!(first.data().iter().all(|v| v.is_finite()), "{}", kind.name);
             assert_ne!(first, second, "{} {carrier:?}", kind.name);

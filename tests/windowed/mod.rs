@@ -142,7 +142,7 @@ fn single(frames: &[Frame<f64>]) -> Vec<Frame<f32>> {
 fn equals_the_naive_sum_everywhere() {
     let frames = texture((61, 47), REFERENCE, 3, &TRIPLE);
     let mut cases = Vec::new();
-    for rows in RowSet::EVERY {
+    for rows in RowSet::ALL {
         for scheme in [TimeScheme::Central, TimeScheme::Backward] {
             cases.push(WindowedOptions { rows, scheme, sigma: 2.5, ..raw() });
         }
@@ -272,7 +272,7 @@ fn soft(motion: [f64; 6]) -> Vec<Frame<f64>> {
 
 #[test]
 fn each_parameter_is_what_its_name_says() {
-    for rows in RowSet::EVERY {
+    for rows in RowSet::ALL {
         for k in 0..6 {
             let mut motion = [0.0; 6];
             motion[k] = if k < 2 { 0.2 } else { 0.01 };
@@ -430,7 +430,7 @@ fn what_cannot_be_seen_is_said() {
     let flat = vec![Frame::filled(40, 30, 77.7f32); 3];
     let stripes: Vec<Frame<f32>> =
         (0..3).map(|t| Frame::from_fn(40, 30, |x, _| 50.0 * ((x as f32 - 0.2 * t as f32) * 0.6).sin())).collect();
-    for rows in RowSet::EVERY {
+    for rows in RowSet::ALL {
         for presmooth in [None, Some(1.2)] {
             let options = WindowedOptions { rows, presmooth, ..raw() };
             let field = estimate(&flat, &options, &common);
@@ -463,7 +463,7 @@ fn options_are_checked_by_name() {
     assert!(refused(WindowedOptions { frames: 2, rows: RowSet::All, ..base() }).starts_with("rows"));
     assert!(refused(WindowedOptions { presmooth: Some(-1.0), ..base() }).starts_with("presmooth"));
     assert!(RowSet::parse("rows").unwrap_err().to_string().starts_with("rows"));
-    for set in RowSet::EVERY {
+    for set in RowSet::ALL {
         assert_eq!(RowSet::parse(set.name()).unwrap(), set);
     }
     // Frames smaller than the window, and a pair.

@@ -3,8 +3,8 @@
 //! Schemes: R. Douc, O. Cappé, E. Moulines, "Comparison of resampling schemes for particle filtering", 2005.
 //! In each the expected number of copies of particle i is `count w_i`; they differ in its variance.
 
-use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
+use crate::types::choices;
 
 /// How particles are selected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -22,35 +22,14 @@ pub enum Resampling {
     Residual,
 }
 
+choices!(Resampling, "resampling":
+    Multinomial "multinomial",
+    Stratified "stratified",
+    Systematic "systematic",
+    Residual "residual",
+);
+
 impl Resampling {
-    /// Every scheme.
-    pub const ALL: [Self; 4] = [Self::Multinomial, Self::Stratified, Self::Systematic, Self::Residual];
-
-    /// Name in options and messages.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Multinomial => "multinomial",
-            Self::Stratified => "stratified",
-            Self::Systematic => "systematic",
-            Self::Residual => "residual",
-        }
-    }
-
-    /// The scheme called `name`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming `resampling`.
-    pub fn parse(name: &str) -> Result<Self> {
-        let names = || Self::ALL.map(|scheme| format!("\"{}\"", scheme.name())).join(", ");
-        let found = Self::ALL.into_iter().find(|scheme| scheme.name() == name);
-        found.ok_or_else(|| Error::argument("resampling", format!("one of {}", names()), format!("{name:?}")))
-    }
-
-    /// Largest number of uniform numbers that a selection of `count` particles takes.
-    pub fn uniforms(self, count: usize) -> usize {
-        if self == Self::Systematic { count.min(1) } else { count }
-    }
-
     /// `count` indices of particles by the uniform numbers of `rng`, into `out`; see [`resample_indices`].
     pub fn indices(self, weights: &[f64], count: usize, rng: &CounterRng, out: &mut Vec<usize>) {
         resample_indices(self, weights, count, |i| rng.uniform(i), out);

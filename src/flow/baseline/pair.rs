@@ -1,11 +1,11 @@
 //! Derivatives of brightness for the baselines, from a pair or from three frames.
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::jet::{JetStencil, Neighbourhood};
 use crate::math::Real;
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::Frame;
+use crate::types::{Frame, choices};
 
 /// Which frames a baseline differences.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -19,27 +19,9 @@ pub enum Differences {
     Pair,
 }
 
+choices!(Differences, "differences": Central "central", Pair "pair");
+
 impl Differences {
-    /// The choice called `name`: `central` or `pair`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming `differences` for another word.
-    pub fn parse(name: &str) -> Result<Self> {
-        match name {
-            "central" => Ok(Self::Central),
-            "pair" => Ok(Self::Pair),
-            other => Err(Error::argument("differences", "central or pair", other)),
-        }
-    }
-
-    /// The choice's name, as [`Differences::parse`] takes it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Central => "central",
-            Self::Pair => "pair",
-        }
-    }
-
     /// Frames needed.
     pub(super) fn frames(self) -> usize {
         match self {

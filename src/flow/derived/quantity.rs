@@ -1,6 +1,6 @@
 //! The derived quantities of one motion.
 
-use crate::error::{Error, Result};
+use crate::types::choices;
 
 /// A number derived from the affine motion `m = (u, v, u_x, v_x, u_y, v_y)` of a point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -39,56 +39,24 @@ pub enum Quantity {
     Speed,
 }
 
+choices!(Quantity, "quantity":
+    Divergence "divergence",
+    Curl "curl",
+    ShearMagnitude "shear_magnitude",
+    ShearAxis "shear_axis",
+    StrainXx "strain_xx",
+    StrainXy "strain_xy",
+    StrainYy "strain_yy",
+    AngularVelocity "angular_velocity",
+    Rpm "rpm",
+    RotationCentreX "rotation_centre_x",
+    RotationCentreY "rotation_centre_y",
+    CentreDistance "centre_distance",
+    TimeToContact "time_to_contact",
+    Speed "speed",
+);
+
 impl Quantity {
-    /// Every quantity.
-    pub const ALL: [Self; 14] = [
-        Self::Divergence,
-        Self::Curl,
-        Self::ShearMagnitude,
-        Self::ShearAxis,
-        Self::StrainXx,
-        Self::StrainXy,
-        Self::StrainYy,
-        Self::AngularVelocity,
-        Self::Rpm,
-        Self::RotationCentreX,
-        Self::RotationCentreY,
-        Self::CentreDistance,
-        Self::TimeToContact,
-        Self::Speed,
-    ];
-
-    /// The name on the command line, in files and in Python.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Divergence => "divergence",
-            Self::Curl => "curl",
-            Self::ShearMagnitude => "shear_magnitude",
-            Self::ShearAxis => "shear_axis",
-            Self::StrainXx => "strain_xx",
-            Self::StrainXy => "strain_xy",
-            Self::StrainYy => "strain_yy",
-            Self::AngularVelocity => "angular_velocity",
-            Self::Rpm => "rpm",
-            Self::RotationCentreX => "rotation_centre_x",
-            Self::RotationCentreY => "rotation_centre_y",
-            Self::CentreDistance => "centre_distance",
-            Self::TimeToContact => "time_to_contact",
-            Self::Speed => "speed",
-        }
-    }
-
-    /// The quantity called `name`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming `quantity` for another word.
-    pub fn parse(name: &str) -> Result<Self> {
-        Self::ALL.into_iter().find(|q| q.name() == name).ok_or_else(|| {
-            let names: Vec<_> = Self::ALL.iter().map(|q| q.name()).collect();
-            Error::argument("quantity", format!("one of {}", names.join(", ")), name)
-        })
-    }
-
     /// The unit of its values, with or without a frame period, for a pixel pitch of 1 px.
     pub fn unit(self, per_second: bool) -> &'static str {
         match (self, per_second) {

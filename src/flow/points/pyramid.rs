@@ -1,6 +1,6 @@
 //! A frame with its halved copies.
 
-use crate::image::{halve_into, halved_size};
+use crate::image::{halve, halved_size};
 use crate::simd::Level;
 use crate::types::Frame;
 
@@ -21,35 +21,16 @@ impl PointPyramid {
     /// The pyramid of `frame` (grey levels) with `levels` levels, the frame itself among them; fewer where a
     /// side would fall below 3 px. Vectorised and parallel over bands of rows.
     pub fn new(frame: Frame<f32>, levels: usize) -> Self {
-        let mut pyramid = Self { planes: vec![frame] };
-        pyramid.build(levels);
-        pyramid
-    }
-
-    /// As [`PointPyramid::new`], reusing the memory of this one. Returns the frame that it held.
-    pub fn replace(&mut self, frame: Frame<f32>, levels: usize) -> Frame<f32> {
-        let old = std::mem::replace(&mut self.planes[0], frame);
-        self.build(levels);
-        old
-    }
-
-    /// Makes the levels above the first.
-    fn build(&mut self, levels: usize) {
-        let simd = Level::detect();
-        let mut count = 1;
-        while count < levels {
-            let (width, height) = halved_size(self.planes[count - 1].size());
+        let (simd, mut planes) = (Level::detect(), vec![frame]);
+        while planes.len() < levels {
+            let finer = &planes[planes.len() - 1];
+            let (width, height) = halved_size(finer.size());
             if width.min(height) < MIN_SIDE {
                 break;
             }
-            if self.planes.len() == count {
-                self.planes.push(Frame::default());
-            }
-            let (finer, coarser) = self.planes.split_at_mut(count);
-            halve_into(simd, &finer[count - 1], &mut coarser[0]);
-            count += 1;
+            planes.push(halve(simd, finer));
         }
-        self.planes.truncate(count);
+        Self { planes }
     }
 
     /// The frame at full size.
@@ -60,11 +41,6 @@ impl PointPyramid {
     /// `(width, height)` of the full size.
     pub fn size(&self) -> (usize, usize) {
         self.planes[0].size()
-    }
-
-    /// Number of levels.
-    pub fn levels(&self) -> usize {
-        self.planes.len()
     }
 
     /// All levels, full size first.

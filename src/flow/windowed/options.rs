@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::flow::RankPolicy;
 use crate::jet::{Neighbourhood, TimeScheme};
+use crate::types::choices;
 
 /// Which of the twelve equations (31)/(34) of WO2010/098160 a window sums. All rows weigh the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
@@ -19,39 +20,17 @@ pub enum RowSet {
     All,
 }
 
+choices!(RowSet, "rows": Brightness "brightness", Gradient "gradient", Jet "jet", All "all");
+
 impl RowSet {
-    /// Every row set, fewest rows first.
-    pub const EVERY: [Self; 4] = [Self::Brightness, Self::Gradient, Self::Jet, Self::All];
-
-    /// The name used in options, and the number of equations that a pixel contributes.
-    fn entry(self) -> (&'static str, usize) {
-        match self {
-            Self::Brightness => ("brightness", 1),
-            Self::Gradient => ("gradient", 3),
-            Self::Jet => ("jet", 6),
-            Self::All => ("all", 12),
-        }
-    }
-
-    /// The name used in options: `brightness`, `gradient`, `jet`, `all`.
-    pub fn name(self) -> &'static str {
-        self.entry().0
-    }
-
-    /// The row set called `name`.
-    ///
-    /// # Errors
-    /// [`Error::Argument`] naming `rows` for another word.
-    pub fn parse(name: &str) -> Result<Self> {
-        Self::EVERY
-            .into_iter()
-            .find(|set| set.name() == name)
-            .ok_or_else(|| Error::argument("rows", "brightness, gradient, jet or all", name))
-    }
-
     /// Number of equations a pixel contributes: 1, 3, 6 or 12.
     pub fn count(self) -> usize {
-        self.entry().1
+        match self {
+            Self::Brightness => 1,
+            Self::Gradient => 3,
+            Self::Jet => 6,
+            Self::All => 12,
+        }
     }
 }
 

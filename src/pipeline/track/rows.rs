@@ -45,7 +45,7 @@ enum Writer {
 impl Writer {
     fn create(path: &Path, format: TrackFormat, further: &[&str]) -> Result<Self> {
         Ok(match format {
-            TrackFormat::Csv => Self::Csv(TrackTable::create_with(path, further)?),
+            TrackFormat::Csv => Self::Csv(TrackTable::create(path, further)?),
             TrackFormat::Mot => Self::Mot(MotTable::create(path)?),
         })
     }
@@ -53,7 +53,7 @@ impl Writer {
         let Row { target, state, further } = row;
         let target = *target;
         match self {
-            Self::Csv(table) => table.write_with(target, (frame, time), state, further),
+            Self::Csv(table) => table.write(target, (frame, time), state, further),
             Self::Mot(table) => table.write(target, frame, state),
         }
     }

@@ -6,7 +6,7 @@ use crate::flow::model::ModelKind;
 use crate::math::Real;
 use crate::types::{FieldLayout, FlowField, Rect};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 
 /// Values of a parameter or quantity at every site.
 pub fn value<T: Real>(field: &FlowField<T>, name: &str) -> Result<Vec<f64>> {
@@ -71,9 +71,5 @@ fn quantity(layout: &FieldLayout, name: &str) -> Result<Quantity> {
 /// Derived quantities with their units (per frame, with a frame period), as a dictionary.
 #[pyfunction]
 pub fn quantities(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
-    let all = PyDict::new(py);
-    for quantity in Quantity::ALL {
-        all.set_item(quantity.name(), (quantity.unit(false), quantity.unit(true)))?;
-    }
-    Ok(all)
+    Quantity::ALL.iter().map(|q| (q.name(), (q.unit(false), q.unit(true)))).into_py_dict(py)
 }

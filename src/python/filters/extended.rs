@@ -3,7 +3,6 @@
 use super::callback::{Callbacks, entry, lead, lock};
 use super::gaussian::GaussianFilter;
 use crate::filter::ExtendedFilter as Core;
-use crate::python::arrays;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Mutex;
@@ -53,7 +52,7 @@ impl ExtendedKalmanFilter {
     fn predict(slf: &Bound<'_, Self>, fx: Py<PyAny>, FJacobian: Option<Py<PyAny>>) -> PyResult<()> {
         let (py, base) = (slf.py(), slf.as_super().get());
         let mut core = lock(&slf.get().core)?;
-        base.give(py, &mut core.state)?;
+        base.give(py, &mut core.state, None, None)?;
         let (batch, n, callbacks, work) = (base.batch, base.dim_x, Callbacks::default(), &mut *core);
         let result = py.detach(|| {
             let step = |points: &[f64], out: &mut [f64]| on_rows(&callbacks, "fx", &fx, batch, (n, n), (points, out));
@@ -87,10 +86,7 @@ impl ExtendedKalmanFilter {
         let (py, base) = (slf.py(), slf.as_super().get());
         let z = base.measurement(z)?;
         let mut core = lock(&slf.get().core)?;
-        base.give(py, &mut core.state)?;
-        if let Some(noise) = R {
-            core.state.R = arrays::doubles("R", base.covariance(3, noise)?.bind(py))?.1;
-        }
+        base.give(py, &mut core.state, None, R)?;
         let (batch, n, m, callbacks, work) = (base.batch, base.dim_x, base.dim_z, Callbacks::default(), &mut *core);
         let result = py.detach(|| {
             let measure =

@@ -75,12 +75,23 @@ impl GaussianFilter {
         self.batch.into_iter().chain(self.tail(index)).collect()
     }
 
-    /// Copies what the user may have changed into the core state.
-    pub fn give(&self, py: Python<'_>, state: &mut GaussianState) -> PyResult<()> {
+    /// Copies what the user may have changed into the core state, with the noise of this step if it has its
+    /// own.
+    pub fn give(
+        &self,
+        py: Python<'_>,
+        state: &mut GaussianState,
+        Q: Option<&Bound<'_, PyAny>>,
+        R: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
         state.x = self.read(py, 0)?;
         state.P = self.read(py, 1)?;
-        state.Q = self.read(py, 2)?;
-        state.R = self.read(py, 3)?;
+        for (index, noise, target) in [(2, Q, &mut state.Q), (3, R, &mut state.R)] {
+            *target = match noise {
+                Some(noise) => arrays::doubles(NAMES[index], self.covariance(index, noise)?.bind(py))?.1,
+                None => self.read(py, index)?,
+            };
+        }
         Ok(())
     }
 

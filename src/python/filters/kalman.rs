@@ -86,10 +86,7 @@ impl KalmanFilter {
     fn predict(slf: &Bound<'_, Self>, F: Option<&Bound<'_, PyAny>>, Q: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let (py, base, this) = (slf.py(), slf.as_super().get(), slf.get());
         let mut core = lock(&this.core)?;
-        base.give(py, &mut core.state)?;
-        if let Some(noise) = Q {
-            core.state.Q = arrays::doubles("Q", base.covariance(2, noise)?.bind(py))?.1;
-        }
+        base.give(py, &mut core.state, Q, None)?;
         let n = base.dim_x;
         core.F = Self::matrix("F", F.unwrap_or(this.f(py).bind(py)), base.batch, [n, n])?.1;
         let core = &mut *core;
@@ -112,10 +109,7 @@ impl KalmanFilter {
         let (py, base, this) = (slf.py(), slf.as_super().get(), slf.get());
         let mut core = lock(&this.core)?;
         let z = base.measurement(z)?;
-        base.give(py, &mut core.state)?;
-        if let Some(noise) = R {
-            core.state.R = arrays::doubles("R", base.covariance(3, noise)?.bind(py))?.1;
-        }
+        base.give(py, &mut core.state, None, R)?;
         let (n, m) = (base.dim_x, base.dim_z);
         core.H = Self::matrix("H", H.unwrap_or(this.h(py).bind(py)), base.batch, [m, n])?.1;
         let core = &mut *core;

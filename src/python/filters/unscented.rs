@@ -107,7 +107,7 @@ impl UnscentedKalmanFilter {
     ) -> PyResult<()> {
         let (py, base, this) = (slf.py(), slf.as_super().get(), slf.get());
         let mut core = lock(&this.core)?;
-        base.give(py, &mut core.state)?;
+        base.give(py, &mut core.state, None, None)?;
         let (dt, fx, batch, n) = (dt.unwrap_or(this.dt), fx.unwrap_or_else(|| this.fx(py)), base.batch, base.dim_x);
         let callbacks = Callbacks::default();
         let (work, augmented, size) = (&mut *core, this.augmented, batch.unwrap_or(1));
@@ -149,10 +149,7 @@ impl UnscentedKalmanFilter {
         let (py, base, this) = (slf.py(), slf.as_super().get(), slf.get());
         let z = base.measurement(z)?;
         let mut core = lock(&this.core)?;
-        base.give(py, &mut core.state)?;
-        if let Some(noise) = R {
-            core.state.R = arrays::doubles("R", base.covariance(3, noise)?.bind(py))?.1;
-        }
+        base.give(py, &mut core.state, None, R)?;
         let (hx, batch, n, m) = (hx.unwrap_or_else(|| this.hx(py)), base.batch, base.dim_x, base.dim_z);
         let callbacks = Callbacks::default();
         let (work, size) = (&mut *core, batch.unwrap_or(1));

@@ -44,14 +44,14 @@ impl Given {
             },
         )?;
         let options = ParticleOptions {
-            mode: word("mode", &self.mode, &ParticleMode::ALL.map(|mode| (mode.name(), mode)))?,
+            mode: ParticleMode::parse(&self.mode)?,
             n_particles: self.n_particles,
             n_near: self.n_near,
             scale: self.scale,
             likelihoods: self.likelihoods.map(|names| Likelihoods::from_names(&names)).transpose()?,
             resampling: Resampling::parse(&self.resampling)?,
             ess_threshold: self.ess_threshold,
-            foreground: word("foreground", &self.foreground, &ForegroundModel::ALL.map(|model| (model.name(), model)))?,
+            foreground: ForegroundModel::parse(&self.foreground)?,
             segment_scale: scale,
             segment_sigma: sigma,
             segment_min_size: min_size,

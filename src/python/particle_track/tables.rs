@@ -29,10 +29,10 @@ fn write_mot(path: &Path, steps: &[&PyParticleStep]) -> Result<()> {
 }
 
 fn write_csv(path: &Path, steps: &[&PyParticleStep]) -> Result<()> {
-    let mut table = TrackTable::create_with(path, &ParticleRows::COLUMNS)?;
+    let mut table = TrackTable::create(path, &ParticleRows::COLUMNS)?;
     for step in steps.iter().map(|step| step.0.step()) {
         for target in &step.targets {
-            table.write_with(target.id as usize, (step.frame, None), &target.state, &ParticleRows::cells(target))?;
+            table.write(target.id as usize, (step.frame, None), &target.state, &ParticleRows::cells(target))?;
         }
     }
     table.finish()

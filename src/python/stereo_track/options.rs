@@ -1,6 +1,5 @@
 //! Options of the stereo tracker as Python gives them.
 
-use crate::error::Error;
 use crate::parallel::Threads;
 use crate::track::stereo::{StereoCamera, StereoMode, StereoTrackerOptions};
 use pyo3::prelude::*;
@@ -25,10 +24,8 @@ pub(super) struct Given {
 
 impl Given {
     pub(super) fn options(self) -> PyResult<StereoTrackerOptions> {
-        let Some(mode) = StereoMode::ALL.into_iter().find(|mode| mode.name() == self.mode) else {
-            return Err(Error::argument("mode", "\"improved\" or \"paper\"", format!("{:?}", self.mode)).into());
-        };
-        let mut options = StereoTrackerOptions::new(mode).with_disparities(self.disparity_range);
+        let mut options =
+            StereoTrackerOptions::new(StereoMode::parse(&self.mode)?).with_disparities(self.disparity_range);
         let (rows, columns, layers) = self.grid;
         options.grid.rows = rows;
         options.grid.columns = columns;

@@ -63,8 +63,6 @@ const PARTICLES: CarrierKind = CarrierKind {
             background: settings.value("background"),
         };
         let (size, options) = (settings.size(), settings.options);
-        Ok(Box::new(
-            ParticleImages::new(size, options.origin, look, motion, options.random_state)?.named(settings.scene),
-        ))
+        Ok(Box::new(ParticleImages::new(size, options.origin, look, motion, options.random_state)?))
     }),
 };

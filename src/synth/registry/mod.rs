@@ -131,7 +131,7 @@ pub fn build(name: &str, options: &SceneOptions) -> Result<Box<dyn Scene>> {
             match (carrier.texture, carrier.carry) {
                 (Some(texture), _) => {
                     let texture = texture(&settings, options.random_state)?;
-                    let carried = Carried::new(kind.name, settings.size(), texture, motion);
+                    let carried = Carried::new(settings.size(), texture, motion);
                     Ok(Box::new(Carried { origin: options.origin, ..carried }))
                 }
                 (None, Some(carry)) => carry(&settings, motion),
@@ -153,7 +153,6 @@ fn find<'a, K>(kinds: &'a [K], argument: &'static str, name: &str, name_of: impl
 
 /// Options that have been checked against what a scene knows.
 struct Settings<'a> {
-    scene: &'static str,
     options: &'a SceneOptions,
     known: Vec<Parameter>,
 }
@@ -178,7 +177,7 @@ impl<'a> Settings<'a> {
                 return Err(Error::argument("parameter", format!("a finite {name}"), value));
             }
         }
-        Ok(Self { scene: kind.name, options, known })
+        Ok(Self { options, known })
     }
 
     fn size(&self) -> (usize, usize) {

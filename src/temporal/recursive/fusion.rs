@@ -81,16 +81,6 @@ impl<T: SimdReal> RecursiveFusion<T> {
         Ok(Self { options, threads: common.threads, level: common.level(), sites: 0, blocks: Vec::new() })
     }
 
-    /// The options.
-    pub fn options(&self) -> &RecursiveOptions {
-        &self.options
-    }
-
-    /// Forgets everything.
-    pub fn reset(&mut self) {
-        (self.sites, self.blocks) = (0, Vec::new());
-    }
-
     /// Number of sites, 0 before the first field, and the states of all, for [`restore`](Self::restore).
     pub fn state(&self) -> (usize, &[T]) {
         (self.sites, &self.blocks)

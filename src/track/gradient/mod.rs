@@ -123,10 +123,6 @@ impl GradientTracker {
 }
 
 impl Tracker for GradientTracker {
-    fn method(&self) -> &'static str {
-        "gradient"
-    }
-
     fn update(&mut self, frame: &Frame<f64>) -> Result<TrackState> {
         if frame.size() != self.size {
             let size = |(width, height): (usize, usize)| format!("{width} x {height} px");

@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::filter::particle::Resampling;
 use crate::parallel::Threads;
 use crate::segment::SegmentOptions;
+use crate::types::choices;
 
 /// Rows of the pictures that the lengths below are given for; others multiply them by rows / 480.
 const REFERENCE_ROWS: f64 = 480.0;
@@ -29,18 +30,7 @@ pub enum ParticleMode {
     Paper,
 }
 
-impl ParticleMode {
-    /// Every mode.
-    pub const ALL: [Self; 2] = [Self::Improved, Self::Paper];
-
-    /// The word used on the command line and in Python.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Improved => "improved",
-            Self::Paper => "paper",
-        }
-    }
-}
+choices!(ParticleMode, "mode": Improved "improved", Paper "paper");
 
 /// How a corner's flow becomes a probability of not being background.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -56,20 +46,12 @@ pub enum ForegroundModel {
     Affine,
 }
 
-impl ForegroundModel {
-    /// Every model.
-    pub const ALL: [Self; 4] = [Self::Ratio, Self::Posterior, Self::Literal, Self::Affine];
-
-    /// The word used in Python.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ratio => "ratio",
-            Self::Posterior => "posterior",
-            Self::Literal => "literal",
-            Self::Affine => "affine",
-        }
-    }
-}
+choices!(ForegroundModel, "foreground":
+    Ratio "ratio",
+    Posterior "posterior",
+    Literal "literal",
+    Affine "affine",
+);
 
 /// The factors of a particle's likelihood, each of which can be left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

@@ -204,11 +204,6 @@ impl ParticleTracker {
         &self.step
     }
 
-    /// The options that the tracker was made with.
-    pub fn options(&self) -> &ParticleOptions {
-        &self.options
-    }
-
     fn check_box(&self, bounds: TargetBox) -> Result<CentredBox> {
         let TargetBox { x, y, width, height } = bounds;
         let finite = [x, y, width, height].iter().all(|value| value.is_finite());

@@ -5,6 +5,7 @@ mod check;
 use crate::mixture::{CovariancePrior, MixtureOptions};
 use crate::parallel::Threads;
 use crate::stereo::{EdgeDisparityOptions, Method};
+use crate::types::choices;
 
 /// `alpha_0` of (8), pixels.
 pub(super) const WEIGHT_CONCENTRATION_PRIOR: f64 = 0.1;
@@ -37,18 +38,7 @@ pub enum StereoMode {
     Paper,
 }
 
-impl StereoMode {
-    /// Every mode.
-    pub const ALL: [Self; 2] = [Self::Improved, Self::Paper];
-
-    /// The word used in Python and on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Improved => "improved",
-            Self::Paper => "paper",
-        }
-    }
-}
+choices!(StereoMode, "mode": Improved "improved", Paper "paper");
 
 /// The grid in which edge pixels are counted: cells over the picture, layers of disparity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
