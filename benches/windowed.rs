@@ -24,7 +24,7 @@ fn windowed(c: &mut Criterion) {
     let refs: Vec<&Frame<f32>> = frames.iter().collect();
     let mut group = c.benchmark_group("windowed 640x480 f32");
     group.sample_size(20);
-    for rows in RowSet::EVERY {
+    for rows in RowSet::ALL {
         for covariance in [false, true] {
             let threads = Threads::new(Some(1)).expect("one thread");
             let common = EstimatorOptions { covariance, threads, ..EstimatorOptions::default() };

@@ -78,8 +78,8 @@ impl TrackTable {
         Ok(Self { table: TableWriter::create(path, &columns)? })
     }
 
-    /// Adds the row of target `target` (from 1) at a frame of the input, and its time, s, if known, with a cell
-    /// for each further column.
+    /// Adds the row of target `target` (from 1) at a frame of the input, and its time, s, if known, with a
+    /// cell for each further column.
     ///
     /// # Errors
     /// [`Error::Io`](crate::Error::Io) when it cannot be written.

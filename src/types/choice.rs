@@ -2,8 +2,8 @@
 
 use crate::error::{Error, Result};
 
-/// The words of an enumeration: the list of its choices, the word for each, and, with the name of an argument,
-/// the choice by its word.
+/// The words of an enumeration: the list of its choices, the word for each and, with the name of an
+/// argument, the choice by its word.
 macro_rules! choices {
     ($choice:ty, $argument:literal: $($variant:ident $word:expr),+ $(,)?) => {
         $crate::types::choices!($choice: $($variant $word),+);

@@ -23,9 +23,6 @@ impl Walker {
 }
 
 impl Tracker for Walker {
-    fn method(&self) -> &'static str {
-        "walker"
-    }
     fn update(&mut self, frame: &Frame<f64>) -> Result<TrackState> {
         let brightness = frame.get(0, 0);
         if brightness == 66.0 {
