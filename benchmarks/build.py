@@ -6,8 +6,8 @@ extension module.
 Crates that the library depends on are compiled once and left out of the cost, in a folder that is deleted at
 the end. Columns: CPU seconds of the compiler on the library, of all its threads; size of the module, stripped
 as in the wheel, MB; CPU time of one flow estimate on one thread over that of the first variant. The estimates
-of the variants take turns, and the least time of each counts. CPU times hold on a machine that is busy, too.
-Needs cargo, `strip` and numpy.
+of the variants take turns, and the least time of each counts. Where two hardware threads share a core, CPU
+times nearly double while the other one works: run it on a quiet machine. Needs cargo, `strip` and numpy.
 """
 
 from __future__ import annotations

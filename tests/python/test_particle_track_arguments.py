@@ -33,7 +33,7 @@ def test_boxes_that_cannot_be_followed_are_named(boxes, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"mode": "fast"}, 'mode: expected "improved", "paper", got "fast"'),
+        ({"mode": "fast"}, 'mode: expected one of improved, paper, got "fast"'),
         ({"mode": None}, 'mode: expected "improved" or "paper", got None'),
         ({"n_particles": 0}, "n_particles: expected at least 8 particles, got 0"),
         ({"n_near": -1}, "n_near: expected an integer from 0 to 100000000, got -1"),
