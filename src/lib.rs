@@ -41,6 +41,8 @@ pub mod motion3d;
 pub mod parallel;
 #[cfg(feature = "pipeline")]
 pub mod pipeline;
+#[cfg(feature = "motion3d")]
+mod scattered;
 #[cfg(feature = "segment")]
 pub mod segment;
 pub mod simd;

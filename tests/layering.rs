@@ -21,6 +21,7 @@ const LEVELS: &[(&str, u8)] = &[
     ("parallel", 0),
     ("simd", 0),
     ("image", 1),
+    ("scattered", 1),
     ("jet", 2),
     ("io", 2),
     ("synth", 2),

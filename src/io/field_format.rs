@@ -34,7 +34,8 @@ impl FieldFormat {
     /// Writes a field. `options` says how it was made, where the format has room for it.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a field of points in a format of pictures; [`Error::Io`] with the path.
+    /// [`Error::Argument`](crate::error::Error::Argument) for a field of points in a format of pictures;
+    /// [`Error::Io`](crate::error::Error::Io) with the path.
     pub fn write<T: Real + Element>(self, path: impl AsRef<Path>, field: &FlowField<T>, options: &str) -> Result<()> {
         match self {
             Self::Npz => write_npz(path, field, options),

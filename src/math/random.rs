@@ -58,6 +58,16 @@ impl CounterRng {
         chosen.sort_unstable();
         chosen
     }
+
+    /// Three different indices below `n`, in any order.
+    pub fn three(&self, n: usize) -> [usize; 3] {
+        let draw = |place: u64, from: usize| (self.uniform(place) * from as f64) as usize;
+        // Each is drawn among those left: indices not below an earlier one move up.
+        let (first, second, third) = (draw(0, n), draw(1, n - 1), draw(2, n - 2));
+        let second = second + usize::from(second >= first);
+        let third = third + usize::from(third >= first.min(second));
+        [first, second, third + usize::from(third >= first.max(second))]
+    }
 }
 
 #[cfg(test)]
@@ -70,5 +80,18 @@ mod tests {
         assert!(chosen.len() == 30 && chosen.windows(2).all(|pair| pair[0] < pair[1]) && chosen[29] < 100);
         assert_ne!(chosen, CounterRng::new(5).sample(100, 30));
         assert_eq!(CounterRng::new(5).sample(3, 30), [0, 1, 2]);
+    }
+
+    #[test]
+    fn three_are_different_and_reach_every_index() {
+        let mut seen = [false; 7];
+        for i in 0..200 {
+            let [a, b, c] = CounterRng::new(i).three(7);
+            assert!(a != b && b != c && a != c);
+            for index in [a, b, c] {
+                seen[index] = true;
+            }
+        }
+        assert!(seen.iter().all(|&seen| seen));
     }
 }

@@ -1,15 +1,17 @@
 //! Experiment design: what a layout of points, a field of view and a noise allow.
 
-use super::kernels::{equations, information, slopes};
-use super::model::input::{Flow, Noise, Placement};
+use super::model::input::{Flow, Noise, Placement, refuse_if};
 use super::model::motion::Motion;
-use super::model::observations::{Observations, UNKNOWNS};
-use super::model::rows::{Matrix5, nested, tangents};
+use super::model::observations::UNKNOWNS;
+use super::model::rows::nested;
 use super::model::whitening::Whitening;
+use super::patches::system::System;
+use super::patches::{AffinePatches, MIN_PATCHES};
 use super::solver::covariance::{determined, direction_deviation};
 use crate::error::{Error, Result, numbers};
+use crate::math::tangents;
 use crate::parallel::Threads;
-use nalgebra::Matrix2x3;
+use nalgebra::SVector;
 
 /// Covariances of `(psi, w)` that theory predicts, rad and rad/frame, in the axes `tangent`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,28 +27,6 @@ pub struct MotionBound {
     pub direction_std: [f64; 3],
     /// Axes of `psi`: two unit vectors perpendicular to `u`.
     pub tangent: [[f64; 3]; 2],
-}
-
-impl MotionBound {
-    /// From the information `M`, the noise `P` of the depths in it and `sum c_kk P_k` for a bound.
-    pub(crate) fn of(
-        tangent: &Matrix2x3<f64>,
-        information: &Matrix5,
-        noise: &Matrix5,
-        weighted: impl Fn(&Matrix5) -> Matrix5,
-    ) -> Result<Self> {
-        let bound = determined(information).ok_or_else(|| {
-            Error::NotObservable("these points do not determine the motion; more of them, or others, would".into())
-        })?;
-        let (likelihood, ideal) = (bound + bound * noise * bound, bound + bound * weighted(&bound) * bound);
-        Ok(Self {
-            bound: nested(&bound),
-            likelihood: nested(&likelihood),
-            ideal: nested(&ideal),
-            direction_std: [bound, likelihood, ideal].map(|covariance| direction_deviation(&covariance)),
-            tangent: nested(tangent),
-        })
-    }
 }
 
 /// The covariances that maximum likelihood and ideal weights have, and the bound, for points whose true
@@ -66,94 +46,74 @@ pub fn motion_bound(
     motion: &Motion,
     inverse_depth: &[f64],
 ) -> Result<MotionBound> {
-    Threads::default().install(|| of_known_depths(points, noise, motion, inverse_depth))
-}
-
-fn of_known_depths(
-    points: &Flow<'_>,
-    noise: &Noise<'_>,
-    motion: &Motion,
-    inverse_depth: &[f64],
-) -> Result<MotionBound> {
     points.check(noise)?;
-    if matches!(noise, Noise::Unknown) {
-        return Err(Error::argument("noise_std", "the noise of the flow, as noise_std or cov", "none"));
-    }
-    check_motion(&motion.translation, &motion.rotation)?;
-    let observations = Whitening::new(points, noise, Placement::Start).whitened();
-    let places: Vec<[f64; 3]> = (0..points.len()).map(|k| points.place(k).into()).collect();
-    let known = with_known_depth(&observations.source, (&places, inverse_depth), |nu| nu.is_finite(), UNKNOWNS)?;
-    let observations = observations.subset(&known);
-    let mut nu: Vec<f64> = observations.source.iter().map(|&k| inverse_depth[k as usize]).collect();
-    nu.resize(observations.stride, 0.0);
-    let tangent = tangents(&motion.u());
-    let m = information(&observations, motion, &tangent, &nu, 0.0);
-    let noise = equations(&observations, motion, &tangent, None).p;
-    MotionBound::of(&tangent, &m, &noise, |bound| weighted_noise(&observations, motion, &tangent, &nu, bound))
+    let is_unknown = matches!(noise, Noise::Unknown);
+    refuse_if(is_unknown, "noise_std", "the noise of the flow, as noise_std or cov", "none")?;
+    let observations = Threads::default().install(|| Whitening::new(points, noise, Placement::Start).whitened());
+    let all = (0..observations.n).map(|k| observations.row(k).measurement()).collect();
+    let depths: Vec<[f64; 1]> = inverse_depth.iter().map(|&nu| [nu]).collect();
+    let finite = (0..points.len()).filter(|&k| points.place(k).iter().all(|value| value.is_finite())).count();
+    of_known_depths(&System { all, source: observations.source }, motion, &depths, (points.len(), finite, UNKNOWNS))
 }
 
-/// Which of the usable points, from `source` among all `places`, have a known depth: at least `least`.
-pub(crate) fn with_known_depth<const N: usize, D>(
-    source: &[u32],
-    (places, depths): (&[[f64; N]], &[D]),
-    is_known: impl Fn(&D) -> bool,
-    least: usize,
-) -> Result<Vec<u32>> {
-    if depths.len() != places.len() {
-        let expected = format!("{} values, one for each point", places.len());
-        return Err(Error::argument("inv_depth", expected, depths.len()));
-    }
-    if source.len() < least {
-        let finite = places.iter().filter(|at| at.iter().all(|value| value.is_finite())).count();
-        // The others lack a finite covariance.
-        return Err(if finite < least {
-            Error::argument("points", format!("at least {least} points that are finite"), finite)
-        } else {
-            Error::argument("cov", format!("finite covariances of at least {least} points"), "fewer")
-        });
-    }
-    let known: Vec<u32> =
-        (0..source.len() as u32).filter(|&k| is_known(&depths[source[k as usize] as usize])).collect();
-    if known.len() < least {
-        return Err(Error::argument("inv_depth", format!("finite values of at least {least} points"), known.len()));
-    }
-    Ok(known)
+/// As [`motion_bound`], for six numbers a patch whose true `(nu, nu_x, nu_y)` are given; their flow is not
+/// looked at.
+///
+/// # Errors
+/// As [`motion_bound`].
+pub fn patch_motion_bound(patches: &AffinePatches<'_>, motion: &Motion, surfaces: &[[f64; 3]]) -> Result<MotionBound> {
+    patches.check()?;
+    let finite = patches.points.iter().filter(|at| at.iter().all(|value| value.is_finite())).count();
+    of_known_depths(&patches.system(None), motion, surfaces, (patches.points.len(), finite, MIN_PATCHES))
+}
+
+/// For the usable of all `given` places, of which so many are finite and at least so many needed.
+fn of_known_depths<const N: usize, const L: usize>(
+    system: &System<N, L>,
+    motion: &Motion,
+    surfaces: &[[f64; L]],
+    (given, finite, least): (usize, usize, usize),
+) -> Result<MotionBound> {
+    check_motion(&motion.translation, &motion.rotation)?;
+    let (name, expected) = ("inv_depth", format!("{given} values, one for each point"));
+    refuse_if(surfaces.len() != given, name, expected, surfaces.len())?;
+    refuse_if(finite < least, "points", format!("at least {least} points that are finite"), finite)?;
+    // The others lack a finite covariance.
+    let expected = format!("finite covariances of at least {least} points");
+    refuse_if(system.source.len() < least, "cov", expected, "fewer")?;
+    let is_known = |&k: &u32| surfaces[system.source[k as usize] as usize].iter().all(|value| value.is_finite());
+    let known: Vec<u32> = (0..system.source.len() as u32).filter(is_known).collect();
+    refuse_if(known.len() < least, name, format!("finite values of at least {least} points"), known.len())?;
+    let system = system.subset(&known);
+    let surfaces: Vec<SVector<f64, L>> = system.source.iter().map(|&k| surfaces[k as usize].into()).collect();
+    let tangent = tangents(&motion.u());
+    let truth = system.equations(motion, &tangent, Some(&surfaces));
+    let bound = determined(&truth.h).ok_or_else(|| {
+        Error::NotObservable("these points do not determine the motion; more of them, or others, would".into())
+    })?;
+    let ideal = bound + bound * system.weighted_noise(motion, &tangent, &surfaces, &bound) * bound;
+    let likelihood = bound + bound * truth.p * bound;
+    Ok(MotionBound {
+        bound: nested(&bound),
+        likelihood: nested(&likelihood),
+        ideal: nested(&ideal),
+        direction_std: [bound, likelihood, ideal].map(|covariance| direction_deviation(&covariance)),
+        tangent: nested(&tangent),
+    })
 }
 
 /// Whether a motion is finite and has a direction.
 pub(crate) fn check_motion(translation: &[f64; 3], rotation: &[f64; 3]) -> Result<()> {
-    let finite = |values: &[f64; 3]| values.iter().all(|value| value.is_finite());
-    if !finite(translation) || *translation == [0.0; 3] {
-        return Err(Error::argument("translation", "a finite vector with a direction", numbers(translation)));
-    }
-    if !finite(rotation) {
-        return Err(Error::argument("rotation", "a finite vector", numbers(rotation)));
-    }
-    Ok(())
-}
-
-/// `sum c_kk P_k` with `c_kk = D_k M^-1 D_k^t`.
-fn weighted_noise(
-    observations: &Observations,
-    motion: &Motion,
-    tangent: &Matrix2x3<f64>,
-    nu: &[f64],
-    bound: &Matrix5,
-) -> Matrix5 {
-    let mut sum = Matrix5::zeros();
-    for k in 0..observations.n {
-        let [d, far] = [nu[k], 1.0].map(|nu| slopes(observations, motion, tangent, nu, k));
-        let along = far.fixed_rows::<2>(0);
-        let s2 = (observations.row(k).g * motion.u()).norm_squared().max(observations.floor);
-        let mut block = sum.fixed_view_mut::<2, 2>(0, 0);
-        block += along * along.transpose() * (d.dot(&(bound * d)) / s2);
-    }
-    sum
+    let is_finite = |values: &[f64; 3]| values.iter().all(|value| value.is_finite());
+    let is_direction = is_finite(translation) && *translation != [0.0; 3];
+    refuse_if(!is_direction, "translation", "a finite vector with a direction", numbers(translation))?;
+    refuse_if(!is_finite(rotation), "rotation", "a finite vector", numbers(rotation))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::motion3d::kernels::{Weighted, equations, information};
     use crate::motion3d::lateral_bound;
 
     /// The direction lies in the image plane once the other unknowns are taken out.
@@ -168,7 +128,7 @@ mod tests {
         let tangent = tangents(&motion.u());
         let mut nu = depths.clone();
         nu.resize(observations.stride, 0.0);
-        let m = information(&observations, &motion, &tangent, &nu, 0.0);
+        let m = information(&observations, &Weighted { motion: &motion, tangent: &tangent, nu: &nu }, 0.0);
         let p = equations(&observations, &motion, &tangent, None).p;
         // The axis that lies in the plane is y; the other is z, along which nothing is seen at the centre.
         let axis = usize::from(tangent[(1, 1)].abs() > 0.5);

@@ -15,15 +15,15 @@ use super::model::whitening::Whitening;
 use super::robust;
 use super::robust::{Consensus, larger};
 use super::solver::covariance::plugged;
+use super::solver::depth_smoother;
 use super::solver::efficient::{beyond_theory, covariance_at};
 use super::solver::finite_rotation::{settle, shift};
 use super::solver::likelihood::{Candidate, choose, minima, near_best, smoothed};
 use super::solver::profile_likelihood::ProfileLikelihood;
 use super::solver::refine::{Minimum, StoppingCriteria, refine};
-use super::solver::smoothing::DepthSmoother;
 use crate::error::Result;
-use crate::math::by_chance;
-use crate::math::random::CounterRng;
+use crate::math::{by_chance, random::CounterRng};
+use crate::scattered::SiteSmoother;
 
 /// The rigid motion that explains a flow field, with covariance and depths.
 ///
@@ -132,9 +132,7 @@ impl Task<'_, '_> {
     fn on(&self, scaled: &mut Scaled, mut inliers: Observations) -> MotionEstimate {
         let flow = self.whitening.flow;
         let mut found = self.begin(&inliers);
-        if !found.is_empty() {
-            settle(self.whitening, &mut inliers, &mut found);
-        }
+        settle(self.whitening, &mut inliers, &mut found);
         if found.is_empty() {
             return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.noise_std);
         }
@@ -199,7 +197,7 @@ impl Task<'_, '_> {
     }
 
     /// The minima in the order of preference.
-    fn chosen(&self, inliers: &Observations, found: &[Minimum]) -> (Vec<Candidate>, Option<DepthSmoother>) {
+    fn chosen(&self, inliers: &Observations, found: &[Minimum]) -> (Vec<Candidate>, Option<SiteSmoother>) {
         if self.options.initial.is_some() {
             let given = |minimum: &Minimum| Candidate { cost: minimum.equations.cost, minimum: *minimum };
             return (found.iter().map(given).collect(), None);
@@ -207,13 +205,13 @@ impl Task<'_, '_> {
         choose(inliers, found, || self.smoother(inliers))
     }
 
-    fn smoother(&self, inliers: &Observations) -> DepthSmoother {
-        DepthSmoother::new(inliers, self.options.smoother, self.rng.stream(3))
+    fn smoother(&self, inliers: &Observations) -> SiteSmoother {
+        depth_smoother(inliers, self.options.smoother, self.rng.stream(3))
     }
 
     /// Maximum likelihood's motion or that of the smoothed weights, which are also solved where maximum
     /// likelihood's theory does not hold.
-    fn solved(&self, inliers: &Observations, candidates: &[Candidate], made: Option<DepthSmoother>) -> Solution {
+    fn solved(&self, inliers: &Observations, candidates: &[Candidate], made: Option<SiteSmoother>) -> Solution {
         let chosen = &candidates[0];
         let wanted = match self.options.method {
             Method::Auto => inliers.n >= SMOOTHED,

@@ -8,7 +8,7 @@
 //! the depths for shrunk ones. The variance is `sigma^2 (mean^2 + a^2 (tau^2 + sigma^2)) / (n (mean^2 + a
 //! tau^2)^2)`.
 
-use super::model::input::check_noise_std;
+use super::{model::input::check_noise_std, model::input::refuse_if};
 use crate::error::{Error, Result};
 use nalgebra::{Matrix2, Vector2};
 
@@ -61,48 +61,39 @@ pub struct LateralEstimate {
     pub inverse_depth: Vec<f64>,
 }
 
-/// First two moments of inverse depths: number, square of the mean, scatter `tau^2` about the mean.
+/// First two moments of N inverse depths: square of the mean, scatter `tau^2` about it; and the variance of
+/// the flow's noise.
 #[derive(Debug, Clone, Copy)]
 struct Moments {
     n: f64,
     squared_mean: f64,
     scatter: f64,
+    noise: f64,
 }
 
 impl Moments {
-    fn of(depths: &[f64]) -> Self {
-        let n = depths.len() as f64;
-        let mean = depths.iter().sum::<f64>() / n;
-        let scatter = depths.iter().map(|nu| (nu - mean).powi(2)).sum::<f64>() / n;
-        Self { n, squared_mean: mean * mean, scatter }
-    }
-
-    /// Mean of the squares, `m2`.
-    fn mean_square(&self) -> f64 {
-        self.squared_mean + self.scatter
-    }
-
     /// `a` of the weights `mean + a (m - mean)`.
-    fn share(&self, weights: LateralWeights, noise: f64) -> f64 {
+    fn share(&self, weights: LateralWeights) -> f64 {
         match weights {
             LateralWeights::Likelihood => 1.0,
             LateralWeights::Ones => 0.0,
-            LateralWeights::Shrunk if self.scatter == 0.0 => 0.0,
-            LateralWeights::Shrunk => self.scatter / (self.scatter + noise),
+            LateralWeights::Shrunk => self.scatter / (self.scatter + self.noise).max(f64::MIN_POSITIVE),
         }
     }
 
-    /// Variance of the angle with weights of the share `a`, in noise of the variance `noise`.
-    fn variance(&self, a: f64, noise: f64) -> f64 {
-        let slope = self.squared_mean + a * self.scatter;
-        if slope == 0.0 {
-            return f64::INFINITY;
+    /// Variance of the angle.
+    fn variance(&self, weights: LateralWeights) -> f64 {
+        let (a, Self { n, squared_mean, scatter, noise }) = (self.share(weights), *self);
+        let slope = squared_mean + a * scatter;
+        if slope > 0.0 {
+            noise * (squared_mean + a * a * (scatter + noise)) / (n * slope * slope)
+        } else {
+            f64::INFINITY
         }
-        noise * (self.squared_mean + a * a * (self.scatter + noise)) / (self.n * slope * slope)
     }
 
-    fn bound(&self, noise: f64) -> f64 {
-        if self.mean_square() == 0.0 { f64::INFINITY } else { noise / (self.n * self.mean_square()) }
+    fn bound(&self) -> f64 {
+        self.noise / (self.n * (self.squared_mean + self.scatter))
     }
 }
 
@@ -115,15 +106,14 @@ struct Sums {
 }
 
 impl Sums {
-    fn of(flow: &[[f64; 2]]) -> Self {
-        let (mut n, mut first, mut second) = (0.0, Vector2::zeros(), Matrix2::zeros());
-        for &f in flow.iter().filter(|f| is_finite(f)) {
-            let f = Vector2::from(f);
-            n += 1.0;
-            first += f;
-            second += f * f.transpose();
+    fn of(flow: impl Iterator<Item = [f64; 2]>) -> Self {
+        let mut sums = Self { n: 0.0, first: Vector2::zeros(), second: Matrix2::zeros() };
+        for f in flow.filter(is_finite).map(Vector2::from) {
+            sums.n += 1.0;
+            sums.first += f;
+            sums.second += f * f.transpose();
         }
-        Self { n, first, second }
+        sums
     }
 
     /// Scatter matrix about the mean.
@@ -131,35 +121,28 @@ impl Sums {
         self.second - self.first * self.first.transpose() / self.n
     }
 
-    /// The principal axis of `Q`, of either sign.
-    fn axis(&self, a: f64) -> Vector2<f64> {
+    /// The principal axis of `F F^t / n + a (sum f f^t - F F^t / n)`, with most depths positive; `None` where
+    /// all of that is zero.
+    fn axis(&self, a: f64) -> Option<Vector2<f64>> {
         let q = self.second - (1.0 - a) * self.about_mean();
         let angle = 0.5 * (q[(0, 1)] + q[(1, 0)]).atan2(q[(0, 0)] - q[(1, 1)]);
-        Vector2::new(angle.cos(), angle.sin())
+        let axis = Vector2::new(angle.cos(), angle.sin());
+        (q.trace() > 0.0).then(|| if axis.dot(&self.first) < 0.0 { -axis } else { axis })
     }
 
-    /// Noise variance by what is across a direction.
-    fn noise(&self, u: &Vector2<f64>) -> f64 {
-        let across = Vector2::new(-u.y, u.x);
-        (across.dot(&(self.second * across)) / (self.n - 1.0)).max(0.0)
-    }
-
-    /// Moments of the depths along a direction, less what noise adds to them.
-    fn moments(&self, u: &Vector2<f64>, noise: f64) -> Moments {
-        let mean = self.first.dot(u) / self.n;
-        let scatter = if self.n > 1.0 { u.dot(&(self.about_mean() * u)) / (self.n - 1.0) - noise } else { 0.0 };
-        Moments { n: self.n, squared_mean: (mean * mean - noise / self.n).max(0.0), scatter: scatter.max(0.0) }
+    /// Moments of the depths along a direction without what noise adds; its variance is that across, where it
+    /// is not given.
+    fn moments(&self, u: &Vector2<f64>, noise: Option<f64>) -> Moments {
+        let (n, across) = (self.n, Vector2::new(-u.y, u.x));
+        let noise = noise.unwrap_or_else(|| (across.dot(&(self.second * across)) / (n - 1.0)).max(0.0));
+        let mean = self.first.dot(u) / n;
+        let scatter = (u.dot(&(self.about_mean() * u)) - (n - 1.0) * noise) / n;
+        Moments { n, squared_mean: (mean * mean - noise / n).max(0.0), scatter: scatter.max(0.0), noise }
     }
 }
 
 fn is_finite(flow: &[f64; 2]) -> bool {
     flow.iter().all(|value| value.is_finite())
-}
-
-/// The sign of an axis that leaves less behind the camera, in squared standard deviations.
-fn in_front(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
-    let along = flow.iter().filter(|f| is_finite(f)).map(|f| axis.dot(&Vector2::from(*f)));
-    if along.map(|along| along * along.abs()).sum::<f64>() < 0.0 { -axis } else { axis }
 }
 
 /// The direction of a translation along the image plane (`u_z = 0`) of a camera that does not turn, from flow
@@ -176,31 +159,23 @@ fn in_front(axis: Vector2<f64>, flow: &[[f64; 2]]) -> Vector2<f64> {
 /// is zero.
 pub fn estimate_lateral(flow: &[[f64; 2]], noise_std: Option<f64>, weights: LateralWeights) -> Result<LateralEstimate> {
     noise_std.map_or(Ok(()), check_noise_std)?;
-    let sums = Sums::of(flow);
+    let sums = Sums::of(flow.iter().copied());
     let least = if noise_std.is_some() { 1.0 } else { 2.0 };
-    if sums.n < least {
-        return Err(Error::argument("flow", format!("at least {least} finite vectors"), sums.n));
-    }
-    if !sums.second.iter().all(|sum| sum.is_finite()) {
-        return Err(Error::argument("flow", "values whose squares are finite", "larger ones"));
-    }
-    let noise = |u: &Vector2<f64>| noise_std.map_or_else(|| sums.noise(u), |noise_std| noise_std * noise_std);
-    let share = |u: &Vector2<f64>| sums.moments(u, noise(u)).share(weights, noise(u));
-    let along = match weights {
-        LateralWeights::Ones => sums.first,
-        LateralWeights::Likelihood => in_front(sums.axis(1.0), flow),
-        LateralWeights::Shrunk => in_front((0..ROUNDS).fold(sums.axis(1.0), |u, _| sums.axis(share(&u))), flow),
-    };
-    if sums.second.trace() == 0.0 || along == Vector2::zeros() {
+    refuse_if(sums.n < least, "flow", format!("at least {least} finite vectors"), sums.n)?;
+    let is_finite_sum = sums.second.iter().all(|sum| sum.is_finite());
+    refuse_if(!is_finite_sum, "flow", "values whose squares are finite", "larger ones")?;
+    let moments = |u: &Vector2<f64>| sums.moments(u, noise_std.map(|noise_std| noise_std * noise_std));
+    let next = |u: Vector2<f64>| sums.axis(moments(&u).share(weights));
+    let found = (0..ROUNDS).try_fold(Vector2::x(), |u, round| if round == 0 { sums.axis(1.0) } else { next(u) });
+    let Some(u) = found else {
         return Err(Error::NotObservable("flow that is zero in sum has no direction".into()));
-    }
-    let u = along.normalize();
-    let (noise, moments) = (noise(&u), sums.moments(&u, noise(&u)));
+    };
+    let moments = moments(&u);
     Ok(LateralEstimate {
         angle: u.y.atan2(u.x),
-        variance: moments.variance(moments.share(weights, noise), noise),
-        bound: moments.bound(noise),
-        noise_std: noise.sqrt(),
+        variance: moments.variance(weights),
+        bound: moments.bound(),
+        noise_std: moments.noise.sqrt(),
         inverse_depth: flow.iter().map(|&f| if is_finite(&f) { u.dot(&Vector2::from(f)) } else { f64::NAN }).collect(),
     })
 }
@@ -216,20 +191,17 @@ pub fn estimate_lateral(flow: &[[f64; 2]], noise_std: Option<f64>, weights: Late
 /// [`Error::NotObservable`] when all are zero.
 pub fn lateral_bound(inverse_depth: &[f64], noise_std: f64) -> Result<LateralBound> {
     check_noise_std(noise_std)?;
-    let known: Vec<f64> = inverse_depth.iter().copied().filter(|nu| nu.is_finite()).collect();
-    if known.is_empty() {
-        return Err(Error::argument("inv_depth", "at least one finite value", "none"));
-    }
-    let (moments, noise) = (Moments::of(&known), noise_std * noise_std);
-    if moments.mean_square() == 0.0 {
+    let sums = Sums::of(inverse_depth.iter().map(|&nu| [nu, 0.0]));
+    refuse_if(sums.n == 0.0, "inv_depth", "at least one finite value", "none")?;
+    if sums.second.trace() == 0.0 {
         return Err(Error::NotObservable("points that are infinitely far do not show a translation".into()));
     }
-    let of = |weights| moments.variance(moments.share(weights, noise), noise);
+    let moments = Moments { noise: noise_std * noise_std, ..sums.moments(&Vector2::x(), Some(0.0)) };
     Ok(LateralBound {
-        bound: moments.bound(noise),
-        likelihood: of(LateralWeights::Likelihood),
-        ones: of(LateralWeights::Ones),
-        shrunk: of(LateralWeights::Shrunk),
-        crossover: (moments.mean_square() * moments.scatter / moments.squared_mean).sqrt(),
+        bound: moments.bound(),
+        likelihood: moments.variance(LateralWeights::Likelihood),
+        ones: moments.variance(LateralWeights::Ones),
+        shrunk: moments.variance(LateralWeights::Shrunk),
+        crossover: ((1.0 + moments.scatter / moments.squared_mean) * moments.scatter).sqrt(),
     })
 }

@@ -56,11 +56,11 @@ mod solver;
 #[cfg(test)]
 mod tests;
 
+pub use crate::scattered::Smoother;
 pub use crate::types::Intrinsics;
-pub use bound::MotionBound;
 #[cfg(feature = "python")]
 pub(crate) use bound::check_motion;
-pub use bound::motion_bound;
+pub use bound::{MotionBound, motion_bound, patch_motion_bound};
 pub use diagnostics::contact::{ContactMap, contact_map};
 pub use estimate::estimate_motion;
 pub use field::{
@@ -69,8 +69,8 @@ pub use field::{
 pub use lateral::{LateralBound, LateralEstimate, LateralWeights, estimate_lateral, lateral_bound};
 pub use model::input::{Flow, Noise, Placement};
 pub use model::motion::Motion;
-pub use model::options::{CommonErrors, Method, MotionOptions, RotationPrior, Smoother};
+pub use model::options::{CommonErrors, Method, MotionOptions, RotationPrior};
 pub use model::result::{
     Alternative, CommonEffect, Likelihood, MotionEstimate, Status, UncertainMotion, focus_of_expansion,
 };
-pub use patches::{AffinePatches, estimate_patch_motion, patch_motion_bound};
+pub use patches::{AffinePatches, estimate_patch_motion};

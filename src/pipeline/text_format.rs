@@ -17,7 +17,7 @@ pub trait TextFormat: Copy + PartialEq + 'static {
     /// The format called `name`.
     ///
     /// # Errors
-    /// [`Error::Argument`] named `format`.
+    /// [`Error::Argument`](crate::error::Error::Argument) named `format`.
     fn parse(name: &str) -> Result<Self> {
         choice_by_name("format", name, Self::ALL, Self::name)
     }

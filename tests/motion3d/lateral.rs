@@ -121,7 +121,7 @@ fn estimates_solve_their_equations() {
     let shrunk = found(LateralWeights::Shrunk);
     let (along, across) = parts(shrunk.angle);
     let mean = along.iter().sum::<f64>() / 60.0;
-    let scatter = along.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / 59.0 - 0.16;
+    let scatter = (along.iter().map(|m| (m - mean).powi(2)).sum::<f64>() - 59.0 * 0.16) / 60.0;
     let weight = |m: f64| mean + (scatter / (scatter + 0.16)) * (m - mean);
     assert!(along.iter().zip(&across).map(|(m, e)| weight(*m) * e).sum::<f64>().abs() < 1e-6);
     assert_eq!(shrunk.noise_std, 0.4);

@@ -3,19 +3,20 @@
 use crate::error::Result;
 use crate::math::Real;
 use crate::motion3d::model::input::{Placement, check_field, measurement};
+use crate::motion3d::model::measurement::Measurement;
+use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Row;
 use crate::motion3d::model::result::{CommonEffect, UncertainMotion};
-use crate::motion3d::model::rows::{Derotation, Matrix5, MidpointDepth, Vector5};
+use crate::motion3d::model::rows::{Matrix5, MidpointDepth};
 use crate::motion3d::model::whitening::plane_row;
 use crate::parallel::Threads;
 use crate::types::{FlowField, Intrinsics};
-use nalgebra::{Matrix2x3, RowVector2, SVector, Vector2, Vector3};
+use nalgebra::{Matrix2x3, SVector, Vector1};
 use rayon::prelude::*;
 
 /// Rates of approach `nu u_z` under a motion.
 pub(crate) struct Rates {
-    u: Vector3<f64>,
-    w: Vector3<f64>,
+    motion: Motion,
     tangent: Matrix2x3<f64>,
     /// Without what errors add that all flow has in common, where that is known.
     covariance: Matrix5,
@@ -31,28 +32,18 @@ impl Rates {
     pub fn new(of: &UncertainMotion) -> Self {
         let covariance = Matrix5::from_fn(|i, j| of.covariance[i][j]) - of.common.added();
         let tangent = Matrix2x3::from_fn(|i, j| of.tangent[i][j]);
-        Self { u: of.motion.u(), w: of.motion.w(), tangent, covariance, common: of.common }
+        Self { motion: of.motion, tangent, covariance, common: of.common }
     }
 
-    /// Slopes of `nu u_z` of a point with `nu^ = T . d / s^2`, whose own slopes are `-nu T . (G e) / s^2` and
-    /// `-(T . R) / s^2`; none at the epipole, where a depth is its neighbours'.
-    pub fn slopes(&self, row: &Row, nu: f64) -> Slopes {
-        let t = row.g * self.u;
-        let s2 = t.norm_squared();
-        let inverse = if s2 > 0.0 { s2.recip() } else { 0.0 };
-        let turn: Vector2<f64> = self.tangent * row.g.transpose() * t * (-nu * inverse);
-        let spin: Vector3<f64> = -row.r.transpose() * t * inverse;
-        let motion = Vector5::new(turn.x, turn.y, spin.x, spin.y, spin.z);
-        // The first columns of `G` are those of the identity: they whiten.
-        self.slopes_of(nu, (motion, t.transpose() * row.g.fixed_columns::<2>(0) * inverse))
-    }
-
-    /// From the slopes of a depth `nu`.
-    pub fn slopes_of(&self, nu: f64, (mut motion, flow): (Vector5, RowVector2<f64>)) -> Slopes {
-        motion *= self.u.z;
-        motion[0] += nu * self.tangent[(0, 2)];
-        motion[1] += nu * self.tangent[(1, 2)];
-        let [along, across] = (flow * self.u.z).into();
+    /// Slopes of `nu u_z` with this surface; of the flow alone at the epipole, where a depth is its
+    /// neighbours'.
+    pub fn slopes<const N: usize, const L: usize>(&self, of: &Measurement<N, L>, surface: &SVector<f64, L>) -> Slopes {
+        let u = self.motion.u();
+        let (mut motion, flow) = of.depth_slopes(&self.tangent, &self.motion, surface);
+        motion *= u.z;
+        motion[0] += surface[0] * self.tangent[(0, 2)];
+        motion[1] += surface[0] * self.tangent[(1, 2)];
+        let [along, across] = (flow * u.z).into();
         motion.push(along).push(across)
     }
 
@@ -66,21 +57,23 @@ impl Rates {
     /// `-1 / (nu u_z)` and its standard deviation, frames, by first order from the variance of `nu` and from
     /// the motion's covariance; infinite where nothing comes nearer.
     pub fn contact(&self, nu: f64, variance: f64, slopes: &Slopes) -> (f64, f64) {
-        let rate = nu * self.u.z;
+        let u_z = self.motion.u().z;
+        let rate = nu * u_z;
         if rate == 0.0 {
             return (f64::INFINITY, f64::INFINITY);
         }
-        let variance = self.u.z * self.u.z * variance + self.variance(rate, slopes);
+        let variance = u_z * u_z * variance + self.variance(rate, slopes);
         (-1.0 / rate, variance.sqrt() / (rate * rate))
     }
 
     /// The same from a point's own flow, and its residual across the epipolar line in units of noise.
     fn own(&self, row: &Row, half_way: MidpointDepth) -> [f64; 3] {
-        let (t, d) = (row.g * self.u, row.f - row.r * self.w);
+        let (t, d) = (row.g * self.motion.u(), row.f - row.r * self.motion.w());
         let s2 = t.norm_squared();
         let nu = t.dot(&d) / s2;
         let depth = half_way.depth(nu);
-        let (contact, deviation) = self.contact(depth, half_way.slope(nu).powi(2) / s2, &self.slopes(row, depth));
+        let slopes = self.slopes(&row.measurement(), &Vector1::new(depth));
+        let (contact, deviation) = self.contact(depth, half_way.slope(nu).powi(2) / s2, &slopes);
         [contact, deviation, (t.y * d.x - t.x * d.y) / s2.sqrt()]
     }
 }
@@ -121,7 +114,12 @@ pub fn contact_map<T: Real>(
     let turn = (placement == Placement::Midpoint).then(|| motion.derotation());
     let half_way = turn.filter(|_| !turning).map_or_else(MidpointDepth::default, |turn| turn.half_way(&motion.u()));
     let at = |site: usize| -> [f64; 3] {
-        let Some(row) = site_row(field, camera, turn.as_ref(), site) else { return [f64::NAN; 3] };
+        let row = measurement(field, site).and_then(|(flow, covariance)| {
+            let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
+            let way = (Placement::Start, turn.as_ref());
+            plane_row([x as f64, y as f64], flow.into(), &covariance, Some(camera), way)
+        });
+        let Some((row, _)) = row else { return [f64::NAN; 3] };
         if turning {
             return [f64::INFINITY, f64::INFINITY, (row.f - row.r * motion.w()).norm()];
         }
@@ -139,19 +137,10 @@ pub fn contact_map<T: Real>(
     })
 }
 
-/// A site's whitened flow, as a displacement with the rotation taken out of it if there is a `turn`; `None`
-/// where it is not valid.
-fn site_row<T: Real>(field: &FlowField<T>, camera: &Intrinsics, turn: Option<&Derotation>, site: usize) -> Option<Row> {
-    let (flow, covariance) = measurement(field, site)?;
-    let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
-    let row = plane_row([x as f64, y as f64], flow.into(), &covariance, Some(camera), (Placement::Start, turn));
-    row.map(|(row, _)| row)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion3d::model::result::UNKNOWN;
+    use crate::motion3d::model::rows::Vector5;
     use crate::motion3d::tests::scenes::Scene;
 
     /// The slopes of the rate are those of the depth that a point's own flow has.
@@ -159,11 +148,11 @@ mod tests {
     fn slopes_are_those_of_the_rate() {
         let scene = Scene::oblique(20, 0.1, 5);
         let observations = scene.observations();
-        let tangent = crate::motion3d::model::rows::tangents(&scene.motion.u());
+        let tangent = crate::math::tangents(&scene.motion.u());
         let known = UncertainMotion {
             motion: scene.motion,
             tangent: crate::motion3d::model::rows::nested(&tangent),
-            covariance: UNKNOWN,
+            covariance: [[f64::NAN; 5]; 5],
             common: CommonEffect::default(),
         };
         let rates = Rates::new(&known);
@@ -175,7 +164,7 @@ mod tests {
         };
         let t = row.g * scene.motion.u();
         let nu = t.dot(&(row.f - row.r * scene.motion.w())) / t.norm_squared();
-        let slopes = rates.slopes(&row, nu).fixed_rows::<5>(0).into_owned();
+        let slopes = rates.slopes(&row.measurement(), &Vector1::new(nu)).fixed_rows::<5>(0).into_owned();
         // Along the epipolar line alone: the part across moves the depth in second order only at the truth.
         for axis in 2..5 {
             let mut step = Vector5::zeros();

@@ -2,131 +2,109 @@
 //!
 //! Points of a plane `nu = n . eta` have the flow `f = G A eta`, `A = u n^t + [w]x` up to a multiple of the
 //! unit matrix: eight numbers (H. Longuet-Higgins 1984). Over a whole frame it is `G A eta / (1 + a_3 .
-//! eta)`, with the last row `a_3` of `A`: a homography. The test uses the flow itself, as depths depart from
-//! a plane's by the error of the motion, too.
+//! eta)`, with the last row `a_3` of `V' A`: a homography. The test uses the flow itself, as depths depart
+//! from a plane's by the error of the motion, too.
 
-use crate::math::random::CounterRng;
-use crate::math::{RARE_STDS, by_chance, chi2_deviation};
+use crate::math::{RARE_STDS, by_chance, chi2_deviation, random::CounterRng};
 use crate::motion3d::kernels::{Depths, depths};
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::{Observations, Row};
+use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::result::Alternative;
-use crate::motion3d::model::rows::Rows;
+use crate::motion3d::model::rows::MidpointDepth;
 use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::covariance::DETERMINED;
-use crate::motion3d::solver::refine::{StoppingCriteria, refine};
-use crate::motion3d::solver::starts::at_most;
-use nalgebra::{Matrix3, RowVector3, SMatrix, SVector, SymmetricEigen, Vector2, Vector3};
-use std::borrow::Cow;
+use crate::motion3d::solver::finite_rotation::{ROUNDS, with_own_rotation};
+use crate::motion3d::solver::starts::{SEARCHED, at_most};
+use nalgebra::{Const, Matrix3, RowVector3, SMatrix, SVector, SymmetricEigen, Vector2, Vector3};
 
-/// Numbers of a plane's flow.
-const NUMBERS: usize = 8;
-
-/// Steps towards a homography; the flow of a plane is linear in its numbers.
-const STEPS: usize = 5;
+type Matrix9 = SMatrix<f64, 9, 9>;
+type Vector9 = SVector<f64, 9>;
 
 /// The likeliest flow of a plane.
 pub(crate) struct PlaneFlow {
-    /// What it leaves of every point's flow, in units of noise.
-    pub rest: Vec<Vector2<f64>>,
-    /// Its square.
+    a: Matrix3<f64>,
+    /// `a_3 = last A`; 0 for instantaneous flow.
+    last: RowVector3<f64>,
+    /// The rotation that was taken out.
+    taken: Vector3<f64>,
+    /// Squares of what it leaves of every point's flow, in units of noise.
     pub chi2: f64,
     /// Measurements less the numbers that they determine.
     pub free: f64,
 }
 
-/// A point as a plane's flow has it.
-struct Point {
-    g: SMatrix<f64, 2, 3>,
-    eta: Vector3<f64>,
-    flow: Vector2<f64>,
-}
-
-impl Point {
-    /// Without the rotation that was taken out, between both ends where there are two.
-    fn new(points: &Observations, k: usize, back: Option<&Matrix3<f64>>) -> Option<Self> {
-        let (row, [x, y, z]): (Row, _) = (points.row(k), points.position[k]);
-        if points.spherical {
-            return Some(Self { g: row.g, eta: Vector3::new(x, y, z), flow: row.f });
-        }
-        let (Some(back), Some(turn)) = (back, &points.turn) else {
-            return Some(Self { g: row.g, eta: Vector3::new(x, y, 1.0), flow: row.f });
-        };
-        let (g, flow) = (row.g * back, row.f - row.r * turn.rotation);
-        // The first columns of G are the unit matrix: what is left of them is the whitening.
-        let left = g.fixed_columns::<2>(0).try_inverse()? * flow;
-        Some(Self { g, eta: Vector3::new(x - 0.5 * left.x, y - 0.5 * left.y, 1.0), flow })
-    }
-
-    /// What the flow of the plane `a` is here, and its slopes by the eight numbers.
-    fn flow_of(&self, a: &Matrix3<f64>, ends: bool) -> (Vector2<f64>, SMatrix<f64, 2, NUMBERS>) {
-        let nearer = if ends { 1.0 / (1.0 + (a.row(2) * self.eta).x) } else { 1.0 };
-        let flow = self.g * (a * self.eta) * nearer;
-        let g = if ends { (self.g - flow * RowVector3::new(0.0, 0.0, 1.0)) * nearer } else { self.g };
-        (flow, SMatrix::from_fn(|i, j| g[(i, j / 3)] * self.eta[j % 3]))
-    }
-}
-
 impl PlaneFlow {
     /// `None` of fewer points than four, or where no plane has such a flow.
     pub fn fit(points: &Observations) -> Option<Self> {
-        let back = match &points.turn {
-            Some(turn) => Some(turn.mean.try_inverse()?),
-            None => None,
-        };
-        let ends = points.turn.is_some();
-        let counts = |k: &usize| points.row(*k).g.norm_squared() > 0.0;
-        let used: Option<Vec<Point>> =
-            (0..points.n).filter(counts).map(|k| Point::new(points, k, back.as_ref())).collect();
-        let used = used?;
-        if 2 * used.len() < NUMBERS {
-            return None;
+        let (last, taken) =
+            points.turn.map_or_else(Default::default, |turn| (turn.mean.row(2).into_owned(), turn.rotation));
+        let (count, mut rank) = (points.n - points.unseen(), 0);
+        let mut out = Self { a: Matrix3::zeros(), last, taken, chi2: 0.0, free: 0.0 };
+        // Instantaneous flow is linear in the numbers.
+        for _ in 0..if points.turn.is_some() { ROUNDS } else { 1 } {
+            rank = out.step(points);
         }
-        let (mut a, mut rank) = (Matrix3::zeros(), 0);
-        for _ in 0..if ends { STEPS } else { 1 } {
-            let (change, determined) = step(&used, &a, ends);
-            a += change;
-            rank = determined;
+        out.chi2 = (0..points.n).map(|k| out.rest(points, k).0.norm_squared()).sum();
+        out.free = (2 * count) as f64 - rank as f64;
+        (count >= 4 && out.chi2.is_finite() && out.free > 0.0).then_some(out)
+    }
+
+    /// What is left of the flow of a point, and the slopes of the plane's by the numbers of `A`.
+    fn rest(&self, points: &Observations, k: usize) -> (Vector2<f64>, SMatrix<f64, 2, 9>) {
+        let (row, eta) = (points.row(k), Vector3::from(points.eta[k]));
+        let moved = self.a * eta;
+        let nearer = 1.0 / (1.0 + (self.last * moved).x);
+        let flow = row.g * moved * nearer;
+        let g = (row.g - flow * self.last) * nearer;
+        (row.f - row.r * self.taken - flow, SMatrix::from_fn(|i, j| g[(i, j / 3)] * eta[j % 3]))
+    }
+
+    /// One step of least squares; returns how many numbers the points determine.
+    fn step(&mut self, points: &Observations) -> usize {
+        let mut normal = Matrix9::zeros();
+        let mut right = Vector9::zeros();
+        for k in 0..points.n {
+            let (rest, slopes) = self.rest(points, k);
+            normal += slopes.transpose() * slopes;
+            right += slopes.transpose() * rest;
         }
-        let mut rest = vec![Vector2::zeros(); points.n];
-        for (k, point) in (0..points.n).filter(counts).zip(&used) {
-            rest[k] = point.flow - point.flow_of(&a, ends).0;
+        let (change, rank) = solution(&normal, &right);
+        self.a += Matrix3::from_row_slice(change.as_slice());
+        rank
+    }
+
+    /// Whether a curved surface explains what is left along the epipolar lines by more than chance and the
+    /// error of the motion would have it: the sum over all points is less sensitive.
+    fn is_bent(&self, points: &Observations, motion: &Motion) -> bool {
+        let (mut normal, mut right) = (Matrix9::zeros(), Vector9::zeros());
+        for k in 0..points.n {
+            let ([x, y, z], t) = (points.eta[k], points.row(k).g * motion.u());
+            let s = t.norm().max(f64::MIN_POSITIVE);
+            let terms = Vector9::from([x, y, z, x * x, x * y, y * y, x * z, y * z, z * z]) * s;
+            normal += terms * terms.transpose();
+            right += terms * (self.rest(points, k).0.dot(&t) / s);
         }
-        let chi2: f64 = rest.iter().map(Vector2::norm_squared).sum();
-        let free = (2 * used.len() - rank) as f64;
-        (chi2.is_finite() && free > 0.0).then_some(Self { rest, chi2, free })
+        // On the plane at distance 1 three of the terms are others.
+        let (bend, rank) = solution(&normal, &right);
+        rank > 3 && !by_chance(right.dot(&bend), (rank - 3 + 5) as f64)
     }
 }
 
-/// One step of least squares, and how many numbers the points determine.
-fn step(points: &[Point], a: &Matrix3<f64>, ends: bool) -> (Matrix3<f64>, usize) {
-    let mut normal = SMatrix::<f64, NUMBERS, NUMBERS>::zeros();
-    let mut right = SVector::<f64, NUMBERS>::zeros();
-    for point in points {
-        let (flow, slopes) = point.flow_of(a, ends);
-        normal += slopes.transpose() * slopes;
-        right += slopes.transpose() * (point.flow - flow);
-    }
-    // In units of each number's own information; points on a line or at few places do not determine all.
+/// The shortest solution of least squares in units of each unknown's own information, and how many numbers
+/// are determined: fewer than all by points on a line or at few places.
+fn solution(normal: &Matrix9, right: &Vector9) -> (Vector9, usize) {
     let scale = normal.diagonal().map(|own| if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 });
-    let scaled = SMatrix::<f64, NUMBERS, NUMBERS>::from_fn(|i, j| normal[(i, j)] * scale[i] * scale[j]);
-    let eigen = SymmetricEigen::<f64, nalgebra::Const<NUMBERS>>::new(scaled);
-    let (mut change, mut rank) = (SVector::<f64, NUMBERS>::zeros(), 0);
+    let scaled = Matrix9::from_fn(|i, j| normal[(i, j)] * scale[i] * scale[j]);
+    let eigen = SymmetricEigen::<f64, Const<9>>::new(scaled);
+    let (mut out, mut rank) = (Vector9::zeros(), 0);
     for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
         if *value > DETERMINED {
-            change += vector * (vector.dot(&right.component_mul(&scale)) / value);
+            out += vector * (vector.dot(&right.component_mul(&scale)) / value);
             rank += 1;
         }
     }
-    let change = change.component_mul(&scale);
-    (Matrix3::from_fn(|i, j| if i == 2 && j == 2 { 0.0 } else { change[3 * i + j] }), rank)
+    (out.component_mul(&scale), rank)
 }
-
-/// Times that a plane's other rotation is taken out of displacements.
-pub(crate) const TURNS: usize = 5;
-
-/// Points that are tested first for a plane.
-pub(crate) const FEW: usize = 1000;
 
 /// The other motion `(n / |n|, w + n x u)` of a scene that is one plane `nu = n . eta`, with the squared
 /// depths behind the camera, in units of their standard deviation, that it has, and how far it is from a
@@ -149,31 +127,23 @@ pub(crate) fn planar_twin(
         chi2_deviation(plane.chi2, plane.free / observations.points_per_independent_sample) < usual * RARE_STDS
     };
     // What is far from a plane is so for few points already.
-    if observations.n > FEW {
-        PlaneFlow::fit(&at_most(observations, FEW, CounterRng::new(0))).filter(fits)?;
+    if observations.n > SEARCHED {
+        PlaneFlow::fit(&at_most(observations, SEARCHED, CounterRng::new(0))).filter(fits)?;
     }
-    let plane = PlaneFlow::fit(observations).filter(fits)?;
-    let Depths { mut nu, s2, .. } = depths(observations, motion);
-    if let Some(turn) = &observations.turn {
-        let middle = turn.middle(&motion.u());
-        for nu in &mut nu {
-            *nu = middle.depth(*nu);
-        }
-    }
+    PlaneFlow::fit(observations).filter(fits).filter(|plane| !plane.is_bent(observations, motion))?;
+    let (u, Depths { nu, s2, .. }) = (motion.u(), depths(observations, motion));
+    let at_first = observations.turn.map_or_else(MidpointDepth::default, |turn| turn.first_end(&u));
     let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for k in (0..observations.n).filter(|&k| s2[k] > 0.0) {
-        let eta = place(observations, motion, k, nu[k]);
+        let eta = Vector3::from(observations.eta[k]);
         normal += s2[k] * eta * eta.transpose();
-        right += s2[k] * nu[k] * eta;
+        right += s2[k] * at_first.depth(nu[k]) * eta;
     }
-    let n = normal.cholesky()?.solve(&right);
-    let u = motion.u();
-    // What a plane leaves of each depth.
-    let rest = |k: usize| (observations.row(k).g * u).dot(&plane.rest[k]) / s2[k];
-    if n.norm() <= 0.0 || bent(observations, &s2, rest) {
-        return None;
-    }
-    let (other, seen) = other_motion(whitening, observations, motion, &n)?;
+    let n = Some(normal.cholesky()?.solve(&right)).filter(|n| n.norm() > 0.0)?;
+    // What the estimate is off by is in the plane, too.
+    let mut seen = observations.clone();
+    let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&u)));
+    let other = with_own_rotation(whitening, &mut seen, other).motion;
     let behind = |motion: Motion| {
         let at = depths(&seen, &motion);
         let behind: f64 = (0..seen.n).map(|k| at.nu[k].min(0.0).powi(2) * at.s2[k]).sum();
@@ -182,71 +152,6 @@ pub(crate) fn planar_twin(
     let angle = other.u().cross(&u).norm().atan2(other.u().dot(&u).abs());
     let [own, opposite] = [other, other.reversed()].map(behind);
     (angle > distinct).then_some(if opposite.excess < own.excess { opposite } else { own })
-}
-
-/// A point's `eta`, where `nu = n . eta` holds for a plane. Half way along a displacement it is the picture
-/// of the point half way, which a displacement that changes the depth has at `m + nu^2 t_z / 4 G(m) t`.
-pub(crate) fn place(observations: &Observations, motion: &Motion, k: usize, nu: f64) -> Vector3<f64> {
-    let [x, y, z] = observations.position[k];
-    if observations.spherical {
-        return Vector3::new(x, y, z);
-    }
-    let Some(turn) = observations.turn else { return Vector3::new(x, y, 1.0) };
-    let t = turn.mean * motion.u();
-    let along = Rows::plane([x, y]).g * t * (0.25 * nu * nu * t.z);
-    Vector3::new(x + along.x, y + along.y, 1.0)
-}
-
-/// The other motion of a plane, and the points as it sees them: displacements with its own rotation taken
-/// out, where another one was.
-pub(crate) fn other_motion<'a>(
-    whitening: &Whitening<'_>,
-    observations: &'a Observations,
-    motion: &Motion,
-    n: &Vector3<f64>,
-) -> Option<(Motion, Cow<'a, Observations>)> {
-    let Some(turn) = observations.turn else {
-        let other = Motion::of(&n.normalize(), &(motion.w() + n.cross(&motion.u())));
-        // What the estimate is off by is in the plane, too.
-        let other = refine(observations, other, StoppingCriteria::FULL).motion;
-        return Some((other, Cow::Borrowed(observations)));
-    };
-    // In the axes half way the translation is V' u and rotations are V' w.
-    let back = turn.mean.try_inverse()?;
-    let w = motion.w() + back * n.cross(&(turn.mean * motion.u()));
-    let mut other = Motion::of(&(back * n).normalize(), &w);
-    let mut seen = observations.clone();
-    for _ in 0..TURNS {
-        seen = whitening.derotated(&seen, other.derotation());
-        other = refine(&seen, other, StoppingCriteria::FULL).motion;
-    }
-    Some((other, Cow::Owned(seen)))
-}
-
-/// Whether a curved surface explains the depths better than a plane by more than chance and the error of the
-/// motion would have it: the sum over all depths is less sensitive.
-///
-/// `rest`: what a plane leaves of each depth.
-pub(crate) fn bent(observations: &Observations, s2: &[f64], rest: impl Fn(usize) -> f64) -> bool {
-    const TERMS: usize = 9;
-    let terms = if observations.spherical { TERMS } else { 6 };
-    let mut sums = nalgebra::SMatrix::<f64, TERMS, { TERMS + 1 }>::zeros();
-    for k in (0..observations.n).filter(|&k| s2[k] > 0.0) {
-        let [x, y, z] = observations.position[k];
-        let height = if observations.spherical { z } else { 1.0 };
-        let row = [height, x, y, x * x, x * y, y * y, x * z, y * z, z * z, rest(k)];
-        for i in 0..terms {
-            for j in (i..terms).chain([TERMS]) {
-                sums[(i, j)] += s2[k] * row[i] * row[j];
-            }
-        }
-    }
-    let normal = nalgebra::DMatrix::from_fn(terms, terms, |i, j| sums[(i.min(j), i.max(j))]);
-    let right = nalgebra::DVector::from_fn(terms, |i, _| sums[(i, TERMS)]);
-    // Without a solution (points on a line) nothing is known of the bending.
-    let Some(factor) = normal.cholesky() else { return false };
-    let explained = right.dot(&factor.solve(&right));
-    !by_chance(explained, (terms - 3 + 5) as f64)
 }
 
 #[cfg(test)]

@@ -3,34 +3,21 @@
 use super::contact::{Rates, Slopes};
 use super::correlated_noise::correlated_rotation_covariance;
 use super::rotation::{RotationOnly, contradicted_rotation};
-use super::solution::{Solution, rotation_shift};
+use super::solution::Solution;
 use crate::math::TRUNCATED_INFORMATION;
-use crate::motion3d::kernels::{Depths, Equations, depths, equations};
+use crate::motion3d::kernels::{Equations, depths, equations};
 use crate::motion3d::model::input::{Flow, to_plane};
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::observations::{CHUNK, Observations};
 use crate::motion3d::model::options::MotionOptions;
-use crate::motion3d::model::result::{Alternative, Likelihood, MotionEstimate, Status, UNKNOWN};
+use crate::motion3d::model::result::{Alternative, Likelihood, MotionEstimate, Status};
 use crate::motion3d::model::rows::{Matrix5, MidpointDepth, nested};
-use crate::motion3d::model::whitening::TOGETHER;
 use crate::motion3d::robust;
 use crate::motion3d::robust::Consensus;
 use crate::motion3d::solver::covariance::{PluginCovariances, direction_deviation, plugged};
 use crate::motion3d::solver::refine::Minimum;
-use nalgebra::{Matrix2x3, Matrix3, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, Vector1};
 use rayon::prelude::*;
-
-/// From inverse depths in the rows to those half way in time.
-fn half_way(points: &Observations, motion: &Motion) -> MidpointDepth {
-    points.turn.map_or_else(MidpointDepth::default, |turn| turn.half_way(&motion.u()))
-}
-
-/// Puts the results of usable points where they came from; others stay as they are.
-fn scatter(to: &mut [f64], observations: &Observations, from: impl Fn(usize) -> f64) {
-    for (k, &source) in observations.source.iter().enumerate() {
-        to[source as usize] = from(k);
-    }
-}
 
 /// The whole result of a motion.
 pub(crate) fn report(
@@ -49,24 +36,45 @@ pub(crate) fn report(
     out.efficient = solution.smooth.is_some();
     out.fell_back = solution.fell_back;
     out.common = solution.common;
-    let mut seen = depths(all, motion);
-    scatter(&mut out.residuals, all, |k| seen.e[k]);
-    let half_way = half_way(all, motion);
-    for k in 0..all.n {
-        (seen.nu[k], seen.s2[k]) = (half_way.depth(seen.nu[k]), seen.s2[k] / half_way.slope(seen.nu[k]).powi(2));
+    let (rates, seen, u_z) = (Rates::new(&out.uncertain()), depths(all, motion), motion.u().z);
+    let half_way = all.turn.map_or_else(MidpointDepth::default, |turn| turn.half_way(&motion.u()));
+    let mut place = vec![None; flow.len()];
+    for (k, &source) in inliers.source.iter().enumerate() {
+        place[source as usize] = Some(k);
     }
-    scatter(&mut out.inverse_depth, all, |k| seen.nu[k]);
-    scatter(&mut out.inverse_depth_std, all, |k| 1.0 / seen.s2[k].sqrt());
-    if let Some(smooth) = &solution.smooth {
-        scatter(&mut out.inverse_depth_smooth, inliers, |k| half_way.depth(smooth[k]));
-    } else {
-        let own = &out.inverse_depth;
-        scatter(&mut out.inverse_depth_smooth, inliers, |k| own[inliers.source[k] as usize]);
+    // The likeliest depth is smoothed where possible, with its variance.
+    let rated = |k: usize| {
+        let own = (half_way.depth(seen.nu[k]), half_way.slope(seen.nu[k]).powi(2) / seen.s2[k]);
+        let inlier = place[all.source[k] as usize];
+        let smooth = inlier.map(|place| solution.smooth.as_ref().map_or(own.0, |nu| half_way.depth(nu[place])));
+        let likeliest = match (inlier, &solution.smooth, &solution.variance) {
+            (Some(place), Some(nu), Some(variance)) => {
+                (half_way.depth(nu[place]), variance[place] * half_way.slope(nu[place]).powi(2))
+            }
+            _ => own,
+        };
+        let slopes = rates.slopes(&all.row(k).measurement(), &Vector1::new(likeliest.0));
+        (own, smooth, rates.contact(likeliest.0, likeliest.1, &slopes), slopes)
+    };
+    let rated: Vec<_> = (0..all.n).into_par_iter().with_min_len(CHUNK).map(rated).collect();
+    // The rate of approach of all inliers together, summed in one order, whoever computed them.
+    let (mut weights, mut sum, mut slopes) = (0.0, 0.0, Slopes::zeros());
+    for (k, ((nu, variance), smooth, contact, own)) in rated.into_iter().enumerate() {
+        let source = all.source[k] as usize;
+        out.residuals[source] = seen.e[k];
+        (out.inverse_depth[source], out.inverse_depth_std[source]) = (nu, variance.sqrt());
+        (out.time_to_contact[source], out.time_to_contact_std[source]) = contact;
+        if let Some(smooth) = smooth {
+            (out.inverse_depth_smooth[source], out.inliers[source]) = (smooth, true);
+            if variance.is_finite() {
+                weights += 1.0 / variance;
+                sum += nu * u_z / variance;
+                slopes += own / variance;
+            }
+        }
     }
-    for &source in &inliers.source {
-        out.inliers[source as usize] = true;
-    }
-    contact(&mut out, all, inliers, &seen, solution);
+    let rate = sum / weights;
+    out.approach = (rate, (u_z * u_z / weights + rates.variance(rate, &(slopes / weights))).sqrt());
     out
 }
 
@@ -74,7 +82,7 @@ pub(crate) fn report(
 pub(crate) fn likelihood(minimum: &Minimum, plugged: Option<&PluginCovariances>) -> Likelihood {
     Likelihood {
         motion: minimum.motion,
-        covariance: plugged.map_or(UNKNOWN, |plugged| nested(&plugged.likelihood)),
+        covariance: plugged.map_or([[f64::NAN; 5]; 5], |plugged| nested(&plugged.likelihood)),
         tangent: nested(&minimum.tangent),
         cost: minimum.equations.cost,
     }
@@ -99,41 +107,6 @@ pub(crate) fn set_motion(
     }
 }
 
-/// Times to contact with their standard deviations, by first order from the depth (smoothed where possible)
-/// and the motion; and the rate of approach of all inliers together.
-fn contact(out: &mut MotionEstimate, all: &Observations, inliers: &Observations, seen: &Depths, solution: &Solution) {
-    let rates = Rates::new(&out.uncertain());
-    let half_way = half_way(inliers, &solution.motion);
-    let own = out.inverse_depth.iter().zip(&out.inverse_depth_std);
-    let mut likeliest: Vec<(f64, f64)> = own.map(|(nu, deviation)| (*nu, deviation * deviation)).collect();
-    if let (Some(nu), Some(variance)) = (&solution.smooth, &solution.variance) {
-        for (k, &source) in inliers.source.iter().enumerate() {
-            likeliest[source as usize] = (half_way.depth(nu[k]), variance[k] * half_way.slope(nu[k]).powi(2));
-        }
-    }
-    let u_z = solution.motion.u().z;
-    let rated = |k: usize| {
-        let (nu, variance) = likeliest[all.source[k] as usize];
-        let row = all.row(k);
-        let slopes = rates.slopes(&row, nu);
-        (rates.contact(nu, variance, &slopes), slopes)
-    };
-    let rated: Vec<((f64, f64), Slopes)> = (0..all.n).into_par_iter().with_min_len(TOGETHER).map(rated).collect();
-    // Summed in one order, whoever computed them.
-    let (mut weights, mut sum, mut slopes) = (0.0, 0.0, Slopes::zeros());
-    for (k, (contact, own)) in rated.iter().enumerate() {
-        let source = all.source[k] as usize;
-        (out.time_to_contact[source], out.time_to_contact_std[source]) = *contact;
-        if out.inliers[source] && seen.s2[k] > 0.0 {
-            weights += seen.s2[k];
-            sum += seen.s2[k] * seen.nu[k] * u_z;
-            slopes += own * seen.s2[k];
-        }
-    }
-    let rate = sum / weights;
-    out.approach = (rate, (u_z * u_z / weights + rates.variance(rate, &(slopes / weights))).sqrt());
-}
-
 /// The result of a camera that only rotates, or stands still.
 pub(crate) fn rotation_report(
     flow: &Flow<'_>,
@@ -144,13 +117,13 @@ pub(crate) fn rotation_report(
     options: &MotionOptions,
 ) -> MotionEstimate {
     let mut out = MotionEstimate::nothing(flow.len(), Status::RotationOnly, noise_std);
+    let (errors, unit) = (options.systematic_errors(), to_plane(flow.camera()));
     let widened = |rotation: &RotationOnly| {
-        let moved = rotation_shift(inliers, &rotation.covariance) * to_plane(flow.camera());
-        let RotationOnly { rotation, covariance, .. } = rotation;
+        let RotationOnly { rotation: w, covariance, .. } = rotation;
         let own = options
             .correlation()
-            .map_or(*covariance, |length| correlated_rotation_covariance(covariance, inliers, rotation, flow, length));
-        own + options.systematic_errors().added_to_rotation(rotation, &moved)
+            .map_or(*covariance, |length| correlated_rotation_covariance(covariance, inliers, w, flow, length));
+        own + rotation.systematic_error((0..inliers.n).map(|k| inliers.row(k).measurement()), &errors, &unit)
     };
     let mut covariance = widened(rotation);
     if let Some(alone) = contradicted_rotation(inliers, widened) {
@@ -160,12 +133,8 @@ pub(crate) fn rotation_report(
         let excess = alone.chi2 + inliers.pulled(&alone.rotation) - rotation.chi2;
         out.alternatives.push(Alternative { motion, excess });
     }
-    report_rotation(&mut out, &rotation.rotation, &covariance, rotation.chi2, &all.source);
-    let rest = |k: usize| {
-        let row = all.row(k);
-        (row.f - row.r * rotation.rotation).norm()
-    };
-    scatter(&mut out.residuals, all, rest);
+    let rest = (0..all.n).map(|k| all.row(k)).map(|row| (row.f - row.r * rotation.rotation).norm());
+    report_rotation(&mut out, rotation, &covariance, all.source.iter().copied().zip(rest));
     for &source in &inliers.source {
         out.inliers[source as usize] = true;
     }
@@ -173,30 +142,28 @@ pub(crate) fn rotation_report(
     out
 }
 
-/// A rotation alone: its covariance, and no depth for any of the usable points `source`.
+/// A rotation alone: its covariance, and no depth for any of the usable points, given with what is left of
+/// their flow.
 pub(crate) fn report_rotation(
     out: &mut MotionEstimate,
-    rotation: &Vector3<f64>,
+    rotation: &RotationOnly,
     covariance: &Matrix3<f64>,
-    cost: f64,
-    source: &[u32],
+    rest: impl Iterator<Item = (u32, f64)>,
 ) {
-    out.motion.rotation = (*rotation).into();
+    out.motion.rotation = rotation.rotation.into();
     for i in 0..3 {
         for j in 0..3 {
             out.covariance[2 + i][2 + j] = covariance[(i, j)];
         }
         out.rotation_std[i] = covariance[(i, i)].sqrt();
     }
-    out.bound = out.covariance;
-    out.likelihood.motion = out.motion;
-    out.likelihood.cost = cost;
-    for &source in source {
+    (out.bound, out.likelihood.motion, out.likelihood.cost) = (out.covariance, out.motion, rotation.chi2);
+    for (source, rest) in rest {
         let source = source as usize;
+        out.residuals[source] = rest;
         (out.inverse_depth[source], out.inverse_depth_smooth[source]) = (0.0, 0.0);
         out.inverse_depth_std[source] = f64::INFINITY;
-        out.time_to_contact[source] = f64::INFINITY;
-        out.time_to_contact_std[source] = f64::INFINITY;
+        (out.time_to_contact[source], out.time_to_contact_std[source]) = (f64::INFINITY, f64::INFINITY);
     }
 }
 

@@ -5,16 +5,19 @@
 //! rotation that is `d = (L^-1 + (D^-1)_ww) g` from `w0`, whose covariance is `L^-1 + C_ww` if both are
 //! right.
 
-use crate::math::by_chance;
+use crate::math::{by_chance, tangents};
 use crate::motion3d::kernels::{add_to_rotation, equations};
+use crate::motion3d::model::measurement::Measurement;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{KnownRotation, Observations, ROUNDING};
+use crate::motion3d::model::options::CommonErrors;
 use crate::motion3d::model::result::Alternative;
-use crate::motion3d::model::rows::{Derotation, Matrix5, Vector5, tangents};
+use crate::motion3d::model::rows::{Derotation, Matrix5, Vector5};
 use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::covariance::{DETERMINED, inverse};
+use crate::motion3d::solver::finite_rotation::ROUNDS;
 use crate::motion3d::solver::refine::{StoppingCriteria, refine};
-use nalgebra::{Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
+use nalgebra::{Matrix2, Matrix3, SMatrix, SVector, SymmetricEigen, Vector3};
 
 /// Least squares for the rotation alone.
 #[derive(Debug, Clone, Copy)]
@@ -53,6 +56,20 @@ impl RotationOnly {
         finite.then_some(Self { rotation, covariance, chi2 })
     }
 
+    /// What errors that all flow has in common add to the covariance; `unit` maps flow to the plane at
+    /// distance 1.
+    pub fn systematic_error<const N: usize, const L: usize>(
+        &self,
+        all: impl Iterator<Item = Measurement<N, L>>,
+        errors: &CommonErrors,
+        unit: &Matrix2<f64>,
+    ) -> Matrix3<f64> {
+        let response = all.map(|one| one.response(None, &SVector::zeros())).sum();
+        let mut inverse = Matrix5::zeros();
+        add_to_rotation(&mut inverse, &self.covariance, 1.0);
+        errors.on((&inverse, &response), &self.rotation, unit).added().fixed_view::<3, 3>(2, 2).into_owned()
+    }
+
     /// The same after all measurements were multiplied by `factor`.
     pub fn in_units(self, factor: f64) -> Self {
         let square = factor * factor;
@@ -72,9 +89,6 @@ pub(crate) fn rotation_only(observations: &Observations) -> Option<RotationOnly>
     RotationOnly::of_rows((0..observations.n).map(|k| (row(k).r, row(k).f)), observations.prior.as_ref())
 }
 
-/// Times that the likeliest rotation is taken out and found again.
-const TURNS: usize = 4;
-
 /// Displacements without the rotation that explains most of them by itself; `None` of other flow, or where
 /// the points do not determine it.
 pub(crate) fn without_likeliest_rotation(
@@ -85,7 +99,7 @@ pub(crate) fn without_likeliest_rotation(
         return None;
     }
     let mut turned = observations.clone();
-    for _ in 0..TURNS {
+    for _ in 0..ROUNDS {
         let found = rotation_only(&turned)?;
         turned = whitening.derotated(&turned, Derotation::new(&found.rotation));
     }

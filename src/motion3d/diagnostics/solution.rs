@@ -1,20 +1,19 @@
 //! A motion found on the inliers, and what a linear theory of independent points leaves out of its
 //! covariance.
 
-use super::correlated_noise::{Weighted, correlated_covariance};
-use super::rotation::{contradiction, of_flow_alone};
-use crate::motion3d::kernels::{depths, equations, information, slopes};
+use super::{correlated_noise::correlated_covariance, rotation::contradiction, rotation::of_flow_alone};
+use crate::motion3d::kernels::{Weighted, depths, equations, information};
 use crate::motion3d::model::input::{Flow, to_plane};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::options::MotionOptions;
-use crate::motion3d::model::result::{Alternative, CommonEffect, Moved, Status};
+use crate::motion3d::model::options::{CommonErrors, MotionOptions};
+use crate::motion3d::model::result::{Alternative, CommonEffect, Status};
 use crate::motion3d::model::rows::Matrix5;
 use crate::motion3d::robust::{Consensus, weighted_by_posterior};
 use crate::motion3d::solver::covariance::{PluginCovariances, inverse};
 use crate::motion3d::solver::efficient::{Efficient, nonlinearity_covariance};
 use crate::motion3d::solver::refine::Minimum;
-use nalgebra::{Matrix2x3, Matrix3, Matrix3x2, RowVector2};
+use nalgebra::{Matrix2x3, Vector1};
 use std::borrow::Cow;
 
 /// A motion found on the inliers.
@@ -95,9 +94,11 @@ impl Solution {
         let nu = self.smooth.as_deref().map_or_else(|| Cow::Owned(depths(inliers, &self.motion).nu), Cow::Borrowed);
         let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
         let errors = options.systematic_errors();
-        let moved = if errors.offset > 0.0 { moved(inliers, &at) } else { Moved::zeros() };
-        let displaced = (&moved, &to_plane(flow.camera()));
-        let effect = errors.on(&independent, &self.motion, inliers.prior.as_ref(), displaced);
+        let squares = information(inliers, &at, 0.0);
+        let effect = match inverse(&squares).filter(|_| errors != CommonErrors::default()) {
+            Some(inverse) => errors.on((&inverse, &response(inliers, &at)), &at.motion.w(), &to_plane(flow.camera())),
+            None => CommonEffect::default(),
+        };
         let own = match options.correlation() {
             Some(length) => correlated_covariance(&independent, inliers, &at, flow, length),
             None => Some(independent),
@@ -106,12 +107,8 @@ impl Solution {
         let (Some(own), common) = (own, effect.added()) else { return };
         let mut covariance = own * wider + common;
         if let Some(known) = &inliers.prior {
-            let precision = if let Some(nu) = &self.smooth {
-                information(inliers, &self.motion, &self.tangent, nu, 0.0)
-            } else {
-                let here = equations(inliers, &self.motion, &self.tangent, None);
-                here.h - here.p
-            };
+            let here = equations(inliers, &self.motion, &self.tangent, None);
+            let precision = if self.smooth.is_some() { squares } else { here.h - here.p };
             if let Some(apart) = contradiction(known, &self.motion.w(), &precision, (&own, wider, &common)) {
                 covariance += apart * apart.transpose();
                 self.undecided = Some(of_flow_alone(inliers, &self.motion));
@@ -121,31 +118,8 @@ impl Solution {
     }
 }
 
-/// What one displacement of all flow does to a rotation alone, of this covariance.
-pub(crate) fn rotation_shift(points: &Observations, covariance: &Matrix3<f64>) -> Matrix3x2<f64> {
-    let mut sum = Matrix3x2::zeros();
-    for k in (0..points.n).filter(|_| !points.spherical) {
-        let row = points.row(k);
-        sum += row.r.transpose() * row.g.fixed_columns::<2>(0);
-    }
-    covariance * sum
-}
-
-/// What one displacement of all flow does to the motion of points: `(sum W^t W)^-1 sum W_k^t p_k^t L_k^-1`,
-/// `L_k^-1` whitening point `k`; what is known beforehand of the rotation is in `W^t W`. Nothing on the
-/// sphere, where flow at different places has no common direction.
-pub(crate) fn moved(inliers: &Observations, at: &Weighted<'_>) -> Moved {
-    let mut sum = Moved::zeros();
-    if inliers.spherical {
-        return sum;
-    }
-    for k in 0..inliers.n {
-        let g = inliers.row(k).g;
-        let t = g * at.motion.u();
-        let across = RowVector2::new(t.y, -t.x) / t.norm().max(f64::MIN_POSITIVE);
-        // The first columns of `G` are those of the identity.
-        sum += slopes(inliers, at.motion, at.tangent, at.nu[k], k) * (across * g.fixed_columns::<2>(0));
-    }
-    let precision = information(inliers, at.motion, at.tangent, at.nu, 0.0);
-    inverse(&precision).map_or(Moved::zeros(), |inverse| inverse * sum)
+/// How the equations respond to more rotation and to a displacement of all flow.
+fn response(inliers: &Observations, at: &Weighted<'_>) -> Matrix5 {
+    let one = |k: usize| inliers.row(k).measurement().response(Some((at.motion, at.tangent)), &Vector1::new(at.nu[k]));
+    (0..inliers.n).map(one).sum()
 }

@@ -8,11 +8,13 @@ mod patches;
 pub use patches::{FieldPatches, field_patches};
 
 use super::estimate::estimate_motion;
-use super::model::input::{Flow, Noise, check_field, measurement};
+use super::model::input::{Flow, Noise, check_field, measurement, refuse_if};
+use super::model::observations::SAMPLE;
 use super::model::options::{CommonErrors, MotionOptions};
 use super::model::result::MotionEstimate;
 use super::patches::estimate_patch_motion;
-use crate::error::{Error, Result};
+use super::solver::refine::MANY;
+use crate::error::Result;
 use crate::math::{Real, median, quantile};
 use crate::types::{FlowField, Intrinsics, Rect, SamplingGrid};
 use nalgebra::{Matrix2, Vector2};
@@ -24,20 +26,10 @@ const BIAS_PER_NOISE: f64 = 0.4;
 /// Share of the points that determine the scale error; others have large covariances for lack of texture.
 const SHARPEST_SHARE: f64 = 0.25;
 
-/// About so many sites of a field are used for its common errors.
-const COMMON_ERROR_SITES: f64 = 4000.0;
-
-/// Distance in correlation lengths from which on errors share no window; the motion's covariance sums what is
-/// correlated farther (`benchmarks/tables/motion3d_drive.py`).
-const INDEPENDENT: f64 = 4.0;
-
 /// Default spacing in correlation lengths, and the least, px: of farther points there are fewer, closer ones
 /// add little.
 const DEFAULT_SPACING: f64 = 2.0;
 const MIN_SPACING: f64 = 8.0;
-
-/// Points of a region below which the default grid is made finer.
-const MIN_REGION_POINTS: usize = 30;
 
 /// Which points of a field are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -106,9 +98,7 @@ pub fn estimate_field_motion<T: Real>(
 ) -> Result<FieldMotion> {
     if let Some(size) = chosen.patches {
         for (name, is_given) in [("spacing", chosen.spacing.is_some()), ("max_points", chosen.most.is_some())] {
-            if is_given {
-                return Err(Error::argument(name, "its default with patches", "another value"));
-            }
+            refuse_if(is_given, name, "its default with patches", "another value")?;
         }
         let patches = field_patches(field, size, chosen.region)?;
         let estimate = estimate_patch_motion(&patches.seen_by(camera), &options.with_common(patches.common))?;
@@ -125,21 +115,19 @@ pub fn estimate_field_motion<T: Real>(
 
 /// Takes every so manieth valid estimate of a field.
 ///
-/// Errors of windowed estimates correlate over the length `l`, as `exp(-d^2 / (4 l^2))`. Points closer than 4
-/// `l` get their covariance times `4 pi l^2 / spacing^2`, the number of points on the area over which errors
-/// are one; farther correlation is for [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions).
-/// A list of points is taken whole.
+/// Errors of windowed estimates correlate over the length `l`, as `exp(-d^2 / (4 l^2))`. Points of a grid get
+/// their covariance times `4 pi l^2 / spacing^2`, the number of points on the area over which errors are one,
+/// if that is above 1; farther correlation is for
+/// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions). A list of points is taken whole.
 ///
 /// # Errors
-/// [`Error::Argument`] for a field without covariance or with a pixel pitch, and for a spacing that is not
-/// positive.
+/// [`Error::Argument`](crate::error::Error::Argument) for a field without covariance or with a pixel pitch, and
+/// for a spacing that is not positive.
 pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Result<FieldPoints> {
     check_field(field)?;
     let correlation_length = field.layout.correlation_length;
     let mut spacing = options.spacing.unwrap_or(MIN_SPACING.max(DEFAULT_SPACING * correlation_length));
-    if !(spacing.is_finite() && spacing > 0.0) {
-        return Err(Error::argument("spacing", "a positive number", spacing));
-    }
+    refuse_if(!(spacing.is_finite() && spacing > 0.0), "spacing", "a positive number", spacing)?;
     let (mut step, mut points_per_independent_sample) = (1, 1.0);
     if let SamplingGrid::Grid { stride, .. } = field.layout.sites {
         let steps = |px: f64| ((px / stride as f64).ceil() as usize).max(1);
@@ -148,16 +136,14 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         step = steps(spacing).max(finest);
         let count = |step: usize| site_pixels(field, step).filter(|(_, at)| is_within(options.region, *at)).count();
         if options.spacing.is_none() && options.region.is_some() {
-            step = (finest..=step).rev().find(|&step| count(step) >= MIN_REGION_POINTS).unwrap_or(finest);
+            step = (finest..=step).rev().find(|&step| count(step) >= SAMPLE).unwrap_or(finest);
         }
         while options.most.is_some_and(|most| count(step) > most.max(1)) {
             step += 1;
         }
         spacing = (step * stride) as f64;
-        if spacing < INDEPENDENT * correlation_length {
-            let shared = 4.0 * std::f64::consts::PI * (correlation_length / spacing).powi(2);
-            points_per_independent_sample = shared.max(1.0);
-        }
+        let shared = 4.0 * std::f64::consts::PI * (correlation_length / spacing).powi(2);
+        points_per_independent_sample = shared.max(1.0);
     }
     let common = common_errors(field);
     let mut out =
@@ -196,7 +182,7 @@ fn is_within(region: Option<Rect>, (x, y): (usize, usize)) -> bool {
 /// Common errors of a whole field: an object that moves little in the picture does not determine the scale
 /// error of flow.
 fn common_errors<T: Real>(field: &FlowField<T>) -> CommonErrors {
-    let step = ((field.len() as f64 / COMMON_ERROR_SITES).sqrt() as usize).max(1);
+    let step = (field.len() / MANY).isqrt().max(1);
     common_errors_of(site_pixels(field, step).filter_map(|(site, _)| measurement(field, site)))
 }
 

@@ -1,19 +1,15 @@
 //! A flow field cut into windows, each of them one patch with six numbers.
 
-use super::{common_errors, is_within, site_pixels};
-use crate::error::{Error, Result};
+use super::{MIN_SPACING, common_errors, is_within, site_pixels};
+use crate::error::Result;
 use crate::math::Real;
 use crate::motion3d::diagnostics::correlated_noise::area;
-use crate::motion3d::model::input::check_field;
-use crate::motion3d::model::options::CommonErrors;
+use crate::motion3d::model::{input::check_field, input::refuse_if, options::CommonErrors};
 use crate::motion3d::patches::AffinePatches;
 use crate::parallel::Threads;
 use crate::types::{FieldLayout, FlowField, Intrinsics, MOTION_NAMES, Rect, SamplingGrid};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 use rayon::prelude::*;
-
-/// Least side of a window, px: six numbers of less add little to those of its pixels.
-const MIN_WINDOW_SIDE: usize = 8;
 
 /// Patches of a field, as [`AffinePatches`] takes them.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -51,16 +47,15 @@ impl FieldPatches {
 /// are larger than the pixels' covariances allow, as over an edge in depth.
 ///
 /// # Errors
-/// [`Error::Argument`] naming `field` for one without covariance, without a Jacobian or with a pixel pitch,
-/// and `patches` for a size below 8 px.
+/// [`Error::Argument`](crate::error::Error::Argument) naming `field` for one without covariance, without a
+/// Jacobian or with a pixel pitch, and `patches` for a size below 8 px.
 pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<Rect>) -> Result<FieldPatches> {
     check_field(field)?;
-    if let Some(missing) = MOTION_NAMES.iter().find(|&&name| !field.layout.parameters.iter().any(|own| own == name)) {
-        return Err(Error::argument("field", "flow with its Jacobian", format!("a field without {missing}")));
-    }
-    if size < MIN_WINDOW_SIDE {
-        return Err(Error::argument("patches", format!("windows of at least {MIN_WINDOW_SIDE} px"), size));
-    }
+    let missing = MOTION_NAMES.iter().find(|&&name| !field.layout.parameters.iter().any(|own| own == name));
+    let got = format!("a field without {}", missing.unwrap_or(&""));
+    refuse_if(missing.is_some(), "field", "flow with its Jacobian", got)?;
+    let is_small = (size as f64) < MIN_SPACING;
+    refuse_if(is_small, "patches", format!("windows of at least {MIN_SPACING} px"), size)?;
     let windows = Windows::new(&field.layout, region, size);
     let sites = windows.pixels_of_windows(field, region);
     let fitted: Vec<_> = Threads::default()

@@ -249,6 +249,13 @@ pub(crate) struct Depths {
     pub e: Vec<f64>,
 }
 
+impl Depths {
+    /// Depths with their precisions.
+    pub fn measured(&self) -> (&[f64], &[f64]) {
+        (&self.nu, &self.s2)
+    }
+}
+
 struct DepthPlanes<'a> {
     view: View<'a>,
     out: [&'a mut [f64]; 3],

@@ -91,14 +91,13 @@ impl Seen {
 /// Sums what `of` makes of each point that is not at the epipole.
 fn sum<const R: usize, const C: usize>(
     points: &Observations,
-    motion: &Motion,
-    tangent: &Matrix2x3<f64>,
+    at: &Weighted<'_>,
     of: impl Fn(usize, &Seen) -> SMatrix<f64, R, C> + Sync,
 ) -> SMatrix<f64, R, C> {
     over_chunks(points, |range| {
         let mut sum = SMatrix::zeros();
         for k in range.start..range.end.min(points.n) {
-            if let Some(seen) = Seen::new(points, motion, tangent, k) {
+            if let Some(seen) = Seen::new(points, at.motion, at.tangent, k) {
                 sum += of(k, &seen);
             }
         }
@@ -106,23 +105,27 @@ fn sum<const R: usize, const C: usize>(
     })
 }
 
+/// Where equations are linearised, and the depths in their weights.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Weighted<'a> {
+    pub motion: &'a Motion,
+    /// Axes of the direction.
+    pub tangent: &'a Matrix2x3<f64>,
+    /// As many as the planes have values.
+    pub nu: &'a [f64],
+}
+
 /// The row `D(nu)` of point `k`, 0 at the epipole.
 pub(crate) fn slopes(points: &Observations, motion: &Motion, tangent: &Matrix2x3<f64>, nu: f64, k: usize) -> Vector5 {
     Seen::new(points, motion, tangent, k).map_or(Vector5::zeros(), |seen| seen.slopes(nu) / seen.s2.sqrt())
 }
 
-/// `sum D(nu)^t D(nu)` with the depths `nu` (as many as the planes have values) in the weights, which are
-/// damped within `kappa^2 = spread` of the epipole, the largest variance of the direction.
-pub(crate) fn information(
-    points: &Observations,
-    motion: &Motion,
-    tangent: &Matrix2x3<f64>,
-    nu: &[f64],
-    spread: f64,
-) -> Matrix5 {
+/// `sum D(nu)^t D(nu)` with weights damped within `kappa^2 = spread` of the epipole, the largest variance of
+/// the direction.
+pub(crate) fn information(points: &Observations, at: &Weighted<'_>, spread: f64) -> Matrix5 {
     // Each of both weights is damped: `s^2 / (s^2 + g kappa^2)`.
-    let mut h = sum(points, motion, tangent, |k, seen| {
-        let row = seen.slopes(nu[k]);
+    let mut h = sum(points, at, |k, seen| {
+        let row = seen.slopes(at.nu[k]);
         row * row.transpose() * (seen.damped(spread).powi(2) * seen.s2)
     });
     if let Some(known) = &points.prior {
@@ -131,19 +134,11 @@ pub(crate) fn information(
     h
 }
 
-/// `sum D(nu)^t D(true)`, the slope of the estimating equation with the depths `nu` in its weights, without
-/// bias: true depths are taken from the points' own flow, of which `share` is in `nu`. Weights are damped
-/// within `kappa^2 = spread` of the epipole.
-pub(crate) fn slope(
-    points: &Observations,
-    motion: &Motion,
-    tangent: &Matrix2x3<f64>,
-    nu: &[f64],
-    share: &[f64],
-    spread: f64,
-) -> Matrix5 {
-    let mut slope = sum(points, motion, tangent, |k, seen| {
-        let mut products = seen.slopes(nu[k]) * seen.slopes(seen.along / seen.s2).transpose();
+/// `sum D(nu)^t D(true)`, the slope of the estimating equation, without bias: true depths are taken from the
+/// points' own flow, of which `share` is in `nu`.
+pub(crate) fn slope(points: &Observations, at: &Weighted<'_>, share: &[f64], spread: f64) -> Matrix5 {
+    let mut slope = sum(points, at, |k, seen| {
+        let mut products = seen.slopes(at.nu[k]) * seen.slopes(seen.along / seen.s2).transpose();
         // The noise of the own depth is in both factors, by its share in the weight.
         let psi = seen.far.fixed_rows::<2>(0);
         products.fixed_view_mut::<2, 2>(0, 0).sub_assign(psi * psi.transpose() * (share[k] / seen.s2));
@@ -164,12 +159,12 @@ pub(crate) struct Bilinear {
 }
 
 impl Bilinear {
-    /// With `D(nu)` at a motion as weights, damped within `kappa^2 = spread` of the epipole.
-    pub fn new(points: &Observations, motion: &Motion, tangent: &Matrix2x3<f64>, nu: &[f64], spread: f64) -> Self {
-        let sums = sum(points, motion, tangent, |k, seen| {
+    /// With `D(nu)` as weights, damped within `kappa^2 = spread` of the epipole.
+    pub fn new(points: &Observations, at: &Weighted<'_>, spread: f64) -> Self {
+        let sums = sum(points, at, |k, seen| {
             let Row { g, r, f } = &seen.row;
             // V = W s / (s^2 + g kappa^2).
-            let weights = seen.slopes(nu[k]) * seen.damped(spread);
+            let weights = seen.slopes(at.nu[k]) * seen.damped(spread);
             let mut h = SMatrix::<f64, 1, 12>::zeros();
             for c in 0..3 {
                 let across = Vector2::new(g[(1, c)], -g[(0, c)]);
@@ -203,7 +198,7 @@ impl Bilinear {
 /// The same with depths that must not be negative: the cost is `sum min over nu >= 0 of |f - nu G u - R
 /// w|^2`. What no point determines stays where it is.
 pub(crate) fn front_equations(points: &Observations, motion: &Motion, tangent: &Matrix2x3<f64>) -> Equations {
-    let sums = sum(points, motion, tangent, |_, seen| {
+    let sums = sum(points, &Weighted { motion, tangent, nu: &[] }, |_, seen| {
         let mut out = SMatrix::<f64, 5, 7>::zeros();
         let Row { r, .. } = &seen.row;
         if seen.along < 0.0 {

@@ -1,11 +1,11 @@
 //! What is given: points with their flow, its noise, where on its path a displacement is measured, and the
 //! camera.
 
-use super::rows::tangents;
 use crate::error::{Error, Result, numbers};
-use crate::math::Real;
+use crate::math::{Real, tangents};
 use crate::types::{FlowField, Intrinsics};
 use nalgebra::{Matrix2, Matrix6, SMatrix, Vector2, Vector3};
+use std::fmt::Display;
 
 /// Points with their flow, N of each.
 #[derive(Debug, Clone, Copy)]
@@ -85,9 +85,8 @@ impl Flow<'_> {
         check_lengths(self.len(), flow)?;
         if let Self::Sphere { bearings, .. } = self {
             let off = |b: &&[f64; 3]| (b[0].hypot(b[1]).hypot(b[2]) - 1.0).abs() > 1e-3;
-            if let Some(wrong) = bearings.iter().find(off) {
-                return Err(Error::argument("points", "bearings of length 1", numbers(wrong)));
-            }
+            let wrong = bearings.iter().find(off);
+            refuse_if(wrong.is_some(), "points", "bearings of length 1", numbers(wrong.into_iter().flatten()))?;
         }
         match (noise, self) {
             (Noise::StandardDeviation(noise_std), _) => check_noise_std(*noise_std),
@@ -106,11 +105,13 @@ impl Flow<'_> {
     }
 }
 
+/// An error that names an argument, if it is wrong.
+pub(crate) fn refuse_if(wrong: bool, name: &'static str, expected: impl Into<String>, got: impl Display) -> Result<()> {
+    if wrong { Err(Error::argument(name, expected, got)) } else { Ok(()) }
+}
+
 pub(crate) fn check_lengths(points: usize, flow: usize) -> Result<()> {
-    if points == flow {
-        return Ok(());
-    }
-    Err(Error::argument("flow", format!("{points} values, one for each point"), flow))
+    refuse_if(points != flow, "flow", format!("{points} values, one for each point"), flow)
 }
 
 /// Whether there is a matrix for every point, each symmetric and `positive`, or not finite: then its point is
@@ -121,10 +122,8 @@ pub(crate) fn check_covariances<const N: usize>(
     positive: impl Fn(usize, &SMatrix<f64, N, N>) -> bool,
 ) -> Result<()> {
     let values = N * N;
-    if covariances.len() != values * points {
-        let expected = format!("{points} matrices of {values} values");
-        return Err(Error::argument("cov", expected, format!("{} values", covariances.len())));
-    }
+    let (expected, got) = (format!("{points} matrices of {values} values"), format!("{} values", covariances.len()));
+    refuse_if(covariances.len() != values * points, "cov", expected, got)?;
     for (k, values) in covariances.chunks_exact(values).enumerate() {
         let given = SMatrix::<f64, N, N>::from_row_slice(values);
         let finite = values.iter().all(|value| value.is_finite());
@@ -144,22 +143,15 @@ pub(crate) fn is_positive<const N: usize>(matrix: &SMatrix<f64, N, N>) -> bool {
 
 /// Whether the fourth power of a standard deviation, which sums of squares hold, is a number.
 pub(crate) fn check_noise_std(noise_std: f64) -> Result<()> {
-    if noise_std > 0.0 && noise_std.powi(4).is_normal() {
-        return Ok(());
-    }
-    Err(Error::argument("noise_std", "a positive number between 1e-75 and 1e75", noise_std))
+    let is_usable = noise_std > 0.0 && noise_std.powi(4).is_normal();
+    refuse_if(!is_usable, "noise_std", "a positive number between 1e-75 and 1e75", noise_std)
 }
 
 /// Whether a field has covariances and is in px.
 pub(crate) fn check_field<T>(field: &FlowField<T>) -> Result<()> {
-    if field.covariance.is_none() {
-        return Err(Error::argument("field", "one with a covariance", "one without"));
-    }
-    if field.layout.pixel_pitch != (1.0, 1.0) {
-        let got = format!("the pixel pitch {:?}", field.layout.pixel_pitch);
-        return Err(Error::argument("field", "flow in px", got));
-    }
-    Ok(())
+    refuse_if(field.covariance.is_none(), "field", "one with a covariance", "one without")?;
+    let pitch = field.layout.pixel_pitch;
+    refuse_if(pitch != (1.0, 1.0), "field", "flow in px", format!("the pixel pitch {pitch:?}"))
 }
 
 /// The flow and its covariance at a valid site.

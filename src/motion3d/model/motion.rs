@@ -1,6 +1,6 @@
 //! A rigid motion: the flow it makes, its finite displacement, its essential matrix.
 
-use super::rows::{AffineRows, Derotation, Rows, Vector5, nested};
+use super::{rows::AffineRows, rows::Derotation, rows::Rows, rows::Vector5, rows::nested};
 use crate::types::Intrinsics;
 use nalgebra::{Matrix2x3, Vector2, Vector3};
 

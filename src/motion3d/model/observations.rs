@@ -1,6 +1,6 @@
 //! What was measured, whitened once: two rows of `G`, `R` and `f` for every usable point, as planes.
 
-use super::rows::{Derotation, Matrix5, Rows, Vector5};
+use super::{measurement::Measurement, rows::Derotation, rows::Matrix5, rows::Rows, rows::Vector5};
 use crate::math::{median, quantile};
 use crate::simd::Level;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, SymmetricEigen, Vector2, Vector3};
@@ -9,6 +9,9 @@ use std::ops::AddAssign;
 
 /// Unknowns of a motion, and the fewest points that determine them.
 pub(crate) const UNKNOWNS: usize = 5;
+
+/// Fewest points whose distribution is estimated from them.
+pub(crate) const SAMPLE: usize = 30;
 
 /// Points of one chunk. Chunks never share a sum, so that sums do not depend on the number of threads. A
 /// multiple of every lane count.
@@ -23,11 +26,11 @@ pub(crate) const PLANES: usize = 14;
 /// Residuals below this share of the flow are rounding.
 pub(crate) const ROUNDING: f64 = 1e-11;
 
-/// Ratios of a point's standard deviations along its axes at which minima are found one after the other: the
-/// smaller the noise along one axis, the narrower the minimum.
-const RATIOS: [f64; 3] = [6.0, 24.0, 96.0];
+/// Ratio of a point's standard deviations along its axes up to which noise counts as round.
+pub(crate) const ROUND: f64 = 6.0;
 
-/// By how much residuals may grow from one of these to the next.
+/// By how much that ratio grows from one search of minima to the next, and residuals may: the smaller the
+/// noise along one axis, the narrower the minimum.
 pub(crate) const LESS_ROUND: f64 = 4.0;
 
 /// One point: `f = nu G u + R w + noise` with unit covariance.
@@ -45,13 +48,13 @@ pub(crate) struct Observations {
     pub n: usize,
     pub stride: usize,
     planes: Vec<f64>,
-    /// Where the rows belong: `(x, y, 0)` on the plane (half way along a displacement with half of the flow's
-    /// noise), the bearing on the sphere.
-    pub position: Vec<[f64; 3]>,
+    /// `eta`: `(x, y, 1)` on the plane, of displacements without their rotation at the first end; the bearing
+    /// on the sphere.
+    pub eta: Vec<[f64; 3]>,
     /// Where the points were given, free of the flow's noise: predictions from neighbourhoods are independent
     /// of a point's residual.
     pub site: Vec<[f64; 3]>,
-    /// Whether positions and sites are bearings.
+    /// Whether `eta` and sites are bearings.
     pub spherical: bool,
     /// Index of each point in what was given.
     pub source: Vec<u32>,
@@ -77,9 +80,16 @@ impl Row {
     /// From screen rows and flow with the noise covariance `S`: everything times `L^-1`, `S = L L^t`. `None`
     /// unless all is finite and `S` positive definite.
     pub fn whitened(rows: &Rows, flow: Vector2<f64>, covariance: &Matrix2<f64>) -> Option<Self> {
-        let whiten = unit(covariance)?;
+        let whiten = covariance.cholesky()?.l().try_inverse()?;
         let row = Self { g: whiten * rows.g, r: whiten * rows.r, f: whiten * flow };
         (0..PLANES).all(|p| row.value(p).is_finite()).then_some(row)
+    }
+
+    /// The same with the depth as the one unknown. The first columns of `G` are those of the identity: they
+    /// whiten. (On the sphere flow at different places has no common displacement.)
+    pub fn measurement(&self) -> Measurement<2, 1> {
+        let depth = [0, 1, 2].map(|axis| self.g.column(axis).into_owned());
+        Measurement { depth, r: self.r, f: self.f, shift: self.g.fixed_columns::<2>(0).into_owned() }
     }
 
     fn value(&self, p: usize) -> f64 {
@@ -103,7 +113,7 @@ impl Observations {
     }
 
     /// Usable points in the order given; `source` says where they come from. Their sites are left empty.
-    pub fn new(rows: &[Row], position: Vec<[f64; 3]>, spherical: bool, source: Vec<u32>) -> Self {
+    pub fn new(rows: &[Row], eta: Vec<[f64; 3]>, spherical: bool, source: Vec<u32>) -> Self {
         let n = rows.len();
         let stride = n.next_multiple_of(ALIGN);
         let mut planes = vec![0.0; PLANES * stride];
@@ -118,7 +128,7 @@ impl Observations {
             stride,
             planes,
             site: Vec::new(),
-            position,
+            eta,
             spherical,
             source,
             floor,
@@ -132,12 +142,12 @@ impl Observations {
         }
     }
 
-    /// Takes units and what is known beforehand from other observations; these have just been whitened.
-    pub fn like(&mut self, other: &Self) {
-        (self.prior, self.points_per_independent_sample, self.displaced) =
-            (other.prior, other.points_per_independent_sample, other.displaced);
-        self.independent = other.independent;
-        self.rescale(other.units);
+    /// The same points in the same units with other rows, from which a rotation was taken out.
+    pub fn derotated(&self, rows: &[Row], eta: Vec<[f64; 3]>, turn: Derotation) -> Self {
+        let Self { planes, floor, eta, .. } = Self::new(rows, eta, false, Vec::new());
+        let mut out = Self { planes, floor, eta, turn: Some(turn), units: 1.0, ..self.clone() };
+        out.rescale(self.units);
+        out
     }
 
     /// The points `chosen`, by index among these.
@@ -155,7 +165,7 @@ impl Observations {
             n,
             stride,
             planes,
-            position: chosen.iter().map(|k| self.position[pick(k)]).collect(),
+            eta: chosen.iter().map(|k| self.eta[pick(k)]).collect(),
             site: chosen.iter().map(|k| self.site[pick(k)]).collect(),
             source: chosen.iter().map(|k| self.source[pick(k)]).collect(),
             ..*self
@@ -222,7 +232,8 @@ impl Observations {
     /// The same points in rounder noise, the roundest first; none where their own is round.
     pub fn rounder(&self) -> Vec<Self> {
         let longest = self.longest();
-        RATIOS.iter().filter(|ratio| **ratio < longest).map(|&ratio| self.rounded(ratio)).collect()
+        let ratios = std::iter::successors(Some(ROUND), |ratio| Some(ratio * LESS_ROUND));
+        ratios.take_while(|ratio| *ratio < longest).map(|ratio| self.rounded(ratio)).collect()
     }
 
     /// Measures in other units of noise: everything times `factor`.
@@ -275,15 +286,6 @@ impl Observations {
         let mut lengths: Vec<f64> = (0..self.n).map(|k| self.plane(12)[k].hypot(self.plane(13)[k])).collect();
         median(&mut lengths).unwrap_or(0.0)
     }
-}
-
-/// `L^-1` of `S = L L^t`; `None` unless `S` is positive definite.
-fn unit(covariance: &Matrix2<f64>) -> Option<Matrix2<f64>> {
-    let first = covariance[(0, 0)].sqrt();
-    let below = covariance[(1, 0)] / first;
-    let second = (covariance[(1, 1)] - below * below).sqrt();
-    let positive = first > 0.0 && second > 0.0;
-    positive.then(|| Matrix2::new(1.0 / first, 0.0, -below / (first * second), 1.0 / second))
 }
 
 /// A rotation known beforehand, with the inverse of its covariance.

@@ -1,13 +1,14 @@
 //! What is given and how it is worked on.
 
-use super::input::{Flow, Noise, Placement};
+use super::input::{Flow, Noise, Placement, refuse_if};
 use super::motion::Motion;
 use super::observations::KnownRotation;
-use super::result::{CommonEffect, Moved};
-use super::rows::{Matrix5, Vector5};
-use crate::error::{Error, Result, numbers};
+use super::result::CommonEffect;
+use super::rows::Matrix5;
+use crate::error::{Result, numbers};
 use crate::parallel::Threads;
-use nalgebra::{Matrix2, Matrix3, Matrix3x2, Vector3};
+use crate::scattered::Smoother;
+use nalgebra::{Matrix2, Matrix3, SMatrix, Vector3};
 
 /// Which estimator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -111,85 +112,50 @@ impl MotionOptions {
     }
 
     pub(crate) fn check(&self, flow: &Flow<'_>, noise: &Noise<'_>) -> Result<()> {
-        if let Some(depths) = self.weight_depths.as_ref().filter(|depths| depths.len() != flow.len()) {
-            let expected = format!("{} values, one for each point", flow.len());
-            return Err(Error::argument("weight_inv_depth", expected, depths.len()));
-        }
-        // Depths have any unit, but no sign that could be turned: what is behind the camera is not seen.
-        let finite = || self.weight_depths.iter().flatten().filter(|nu| nu.is_finite());
-        if finite().count() > 0 && !finite().any(|&nu| nu > 0.0) {
+        if let Some(depths) = &self.weight_depths {
+            let (n, name) = (flow.len(), "weight_inv_depth");
+            refuse_if(depths.len() != n, name, format!("{n} values, one for each point"), depths.len())?;
+            // Depths have any unit, but no sign that could be turned: what is behind the camera is not seen.
+            let finite: Vec<f64> = depths.iter().copied().filter(|nu| nu.is_finite()).collect();
+            let is_behind = !finite.is_empty() && finite.iter().all(|&nu| nu <= 0.0);
             let expected = "inverse depths of points before the camera, which are positive";
-            return Err(Error::argument("weight_inv_depth", expected, "none above 0"));
+            refuse_if(is_behind, name, expected, "none above 0")?;
         }
-        if let Some(prior) = self.rotation_prior.as_ref().filter(|prior| prior.information().is_none()) {
+        if let Some(RotationPrior { rotation, covariance }) = &self.rotation_prior {
+            let got = format!("{} with {}", numbers(rotation), numbers(covariance.as_flattened()));
             let expected = "a finite rotation with a positive definite covariance";
-            let (rotation, covariance) = (numbers(&prior.rotation), numbers(prior.covariance.as_flattened()));
-            return Err(Error::argument("rotation_prior", expected, format!("{rotation} with {covariance}")));
+            refuse_if(
+                self.rotation_prior.and_then(|prior| prior.information()).is_none(),
+                "rotation_prior",
+                expected,
+                got,
+            )?;
         }
-        self.check_initial()?;
+        if let Some(Motion { translation, rotation }) = &self.initial {
+            let name = "initial";
+            refuse_if(self.robust, name, "none, as a robust search looks everywhere", "a motion")?;
+            refuse_if(*translation == [0.0; 3], name, "a translation with a direction", "zero")?;
+            let is_finite = translation.iter().chain(rotation).all(|value| value.is_finite());
+            let got = format!("{} and {}", numbers(translation), numbers(rotation));
+            refuse_if(!is_finite, name, "a finite translation and rotation", got)?;
+        }
         self.check_common(matches!(flow, Flow::Sphere { .. }))?;
-        self.check_correlation(noise)
-    }
-
-    fn check_initial(&self) -> Result<()> {
-        match &self.initial {
-            Some(_) if self.robust => {
-                Err(Error::argument("initial", "none, as a robust search looks everywhere", "a motion"))
-            }
-            Some(m) if m.translation == [0.0; 3] => {
-                Err(Error::argument("initial", "a translation with a direction", "zero"))
-            }
-            Some(m) if !m.translation.iter().chain(&m.rotation).all(|value| value.is_finite()) => {
-                let got = format!("{} and {}", numbers(&m.translation), numbers(&m.rotation));
-                Err(Error::argument("initial", "a finite translation and rotation", got))
-            }
-            _ => Ok(()),
-        }
+        let length = self.correlation_length.unwrap_or(0.0);
+        refuse_if(!(0.0..f64::INFINITY).contains(&length), "correlation_length", "a number of at least 0", length)?;
+        let (points, name) = (self.points_per_independent_sample.unwrap_or(1.0), "points_per_independent_sample");
+        refuse_if(!(1.0..f64::INFINITY).contains(&points), name, "a number of at least 1", points)?;
+        refuse_if(points > 1.0 && matches!(noise, Noise::Unknown), name, "1 without noise_std and cov", points)
     }
 
     /// On the plane or the sphere.
     pub(crate) fn check_common(&self, is_spherical: bool) -> Result<()> {
         let CommonErrors { scale, offset } = self.systematic_errors();
-        if !(0.0..=1.0).contains(&scale) {
-            return Err(Error::argument("flow_scale_std", "a number from 0 to 1", scale));
-        }
+        refuse_if(!(0.0..=1.0).contains(&scale), "flow_scale_std", "a number from 0 to 1", scale)?;
         // Squares of larger ones are not finite.
-        if !(0.0..=1e100).contains(&offset) {
-            return Err(Error::argument("flow_bias_std", "a number from 0 to 1e100", offset));
-        }
-        if is_spherical && offset > 0.0 {
-            let expected = "0 on the sphere, whose flow has no common displacement";
-            return Err(Error::argument("flow_bias_std", expected, offset));
-        }
-        Ok(())
+        refuse_if(!(0.0..=1e100).contains(&offset), "flow_bias_std", "a number from 0 to 1e100", offset)?;
+        let expected = "0 on the sphere, whose flow has no common displacement";
+        refuse_if(is_spherical && offset > 0.0, "flow_bias_std", expected, offset)
     }
-
-    fn check_correlation(&self, noise: &Noise<'_>) -> Result<()> {
-        if let Some(length) = self.correlation_length.filter(|length| !(length.is_finite() && *length >= 0.0)) {
-            return Err(Error::argument("correlation_length", "a number of at least 0", length));
-        }
-        match self.points_per_independent_sample {
-            Some(points) if !(points.is_finite() && points >= 1.0) => {
-                Err(Error::argument("points_per_independent_sample", "a number of at least 1", points))
-            }
-            Some(points) if points > 1.0 && matches!(noise, Noise::Unknown) => {
-                Err(Error::argument("points_per_independent_sample", "1 without noise_std and cov", points))
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
-/// Which predictors may be used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Smoother {
-    /// The better of both on these points.
-    #[default]
-    Auto,
-    /// One normal distribution of all inverse depths.
-    Prior,
-    /// Local-linear regression on the 8, 16, 32 or 64 nearest points.
-    Neighbours,
 }
 
 /// Standard deviations of errors that all flow of a picture has in common. Default: 0.
@@ -202,36 +168,20 @@ pub struct CommonErrors {
 }
 
 impl CommonErrors {
-    /// What both do to a motion of this covariance; `moved`: what displacements on the plane at distance 1 do
-    /// to it, to which `unit` maps flow. Less what is known beforehand of the rotation.
+    /// What both do to a motion: `inverse` of the equations' information, which holds what is known
+    /// beforehand of the rotation, and their `response` (see
+    /// [`Measurement::response`](super::measurement::Measurement::response)). `unit` maps flow to the plane
+    /// at distance 1.
     pub(crate) fn on(
         &self,
-        covariance: &Matrix5,
-        motion: &Motion,
-        known: Option<&KnownRotation>,
-        (moved, unit): (&Moved, &Matrix2<f64>),
+        (inverse, response): (&Matrix5, &Matrix5),
+        w: &Vector3<f64>,
+        unit: &Matrix2<f64>,
     ) -> CommonEffect {
-        let w = motion.w();
-        let mut scaled = Vector5::new(0.0, 0.0, w.x, w.y, w.z);
-        if let Some(known) = known {
-            scaled -= covariance.fixed_columns::<3>(2) * (known.information * w);
-        }
-        let displaced = unit * self.offset;
-        let along = moved * displaced;
-        CommonEffect {
-            scale: self.scale,
-            displaced: [0, 1].map(|k| displaced.column(k).into_owned().into()),
-            motion: [
-                (scaled * self.scale).into(),
-                along.column(0).into_owned().into(),
-                along.column(1).into_owned().into(),
-            ],
-        }
-    }
-
-    /// What both add to the covariance of a rotation alone; `moved`: what displacements in the unit of the
-    /// flow do to it.
-    pub(crate) fn added_to_rotation(&self, w: &Vector3<f64>, moved: &Matrix3x2<f64>) -> Matrix3<f64> {
-        w * w.transpose() * self.scale.powi(2) + moved * moved.transpose() * self.offset.powi(2)
+        let mut changes = SMatrix::<f64, 5, 3>::zeros();
+        changes.fixed_view_mut::<3, 1>(0, 0).copy_from(&(w * self.scale));
+        changes.fixed_view_mut::<2, 2>(3, 1).copy_from(&(unit * self.offset));
+        let motion = inverse * response * changes;
+        CommonEffect { scale: self.scale, displaced: (unit * self.offset).into(), motion: motion.into() }
     }
 }

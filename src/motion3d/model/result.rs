@@ -1,9 +1,8 @@
 //! The result of an estimate.
 
-use super::motion::Motion;
-use super::rows::{Matrix5, Vector5, nested};
+use super::{motion::Motion, rows::Matrix5, rows::Vector5, rows::nested};
 use crate::types::Intrinsics;
-use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, RowVector2, SMatrix, SVector, Vector2};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, RowVector2, SVector, Vector2};
 
 /// Whether an estimate is usable, or why not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -121,8 +120,6 @@ pub struct MotionEstimate {
     pub likelihood: Likelihood,
 }
 
-pub(crate) const UNKNOWN: [[f64; 5]; 5] = [[f64::NAN; 5]; 5];
-
 impl MotionEstimate {
     /// The motion as [`contact_map`](crate::motion3d::contact_map) takes it.
     pub fn uncertain(&self) -> UncertainMotion {
@@ -133,16 +130,16 @@ impl MotionEstimate {
     /// No motion, for N points.
     pub(crate) fn nothing(n: usize, status: Status, noise_std: f64) -> Self {
         let none = Motion { translation: [f64::NAN; 3], rotation: [f64::NAN; 3] };
-        let nowhere = [[f64::NAN; 3]; 2];
+        let (nowhere, unknown) = ([[f64::NAN; 3]; 2], [[f64::NAN; 5]; 5]);
         Self {
             motion: none,
             status,
             efficient: false,
             fell_back: false,
-            covariance: UNKNOWN,
+            covariance: unknown,
             tangent: nowhere,
             common: CommonEffect::default(),
-            bound: UNKNOWN,
+            bound: unknown,
             direction_std: f64::NAN,
             rotation_std: [f64::NAN; 3],
             inverse_depth: vec![f64::NAN; n],
@@ -156,7 +153,7 @@ impl MotionEstimate {
             noise_std,
             residuals: vec![f64::NAN; n],
             alternatives: Vec::new(),
-            likelihood: Likelihood { motion: none, covariance: UNKNOWN, tangent: nowhere, cost: f64::NAN },
+            likelihood: Likelihood { motion: none, covariance: unknown, tangent: nowhere, cost: f64::NAN },
         }
     }
 }
@@ -183,9 +180,6 @@ pub fn focus_of_expansion(
     let at = camera.map_or(at, |camera| camera.to_pixel(at));
     Some((at, nested(&of_focus)))
 }
-
-/// What one displacement of all flow, on the plane at distance 1, does to the equations' unknowns.
-pub(crate) type Moved = SMatrix<f64, 5, 2>;
 
 /// What they do to a motion: its covariance has the squares of `motion` in it. Default: nothing.
 ///

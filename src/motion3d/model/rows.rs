@@ -12,6 +12,7 @@
 //! with `R = (1 - nu t_z / 2) R(m)` and the middle `m` of both ends. So the rows `G(eta_1') V'`, `R V'` with
 //! the flow `eta_2' - eta_1' + R V' w` (and `V' w = w`) have the unknowns `(u, w)` of instantaneous flow.
 
+use crate::math::tangents;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Rotation3, SMatrix, Vector2, Vector3};
 
 /// The two rows of `G` and of `R` at one point: `f = nu G u + R w`, in screen axes.
@@ -24,25 +25,6 @@ pub(crate) struct Rows {
 /// A matrix row by row.
 pub(crate) fn nested<const R: usize, const C: usize>(matrix: &SMatrix<f64, R, C>) -> [[f64; C]; R] {
     matrix.transpose().into()
-}
-
-/// Two unit vectors `e1`, `e2` with `e1 x e2 = direction` (of length 1), as rows; the same for the same
-/// direction.
-pub(crate) fn tangents(direction: &Vector3<f64>) -> Matrix2x3<f64> {
-    // The axis least along the direction keeps the cross product well away from zero.
-    let axis = direction.iamin();
-    let first = Vector3::ith(axis, 1.0).cross(direction).normalize();
-    let second = direction.cross(&first);
-    Matrix2x3::from_rows(&[first.transpose(), second.transpose()])
-}
-
-/// Tangent axes of another direction `u`, each on the side where it was.
-pub(crate) fn carried(axes: &Matrix2x3<f64>, u: &Vector3<f64>) -> Matrix2x3<f64> {
-    let [first, second] = [0, 1].map(|row| axes.row(row).transpose());
-    let first = (first - u * u.dot(&first)).normalize();
-    let across = u.cross(&first);
-    let second = across * second.dot(&across).signum();
-    Matrix2x3::from_rows(&[first.transpose(), second.transpose()])
 }
 
 impl Rows {
@@ -122,9 +104,11 @@ pub(crate) struct Derotation {
 /// A displacement with the rotation taken out.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DerotatedFlow {
+    /// The first end, free of the flow's noise.
+    pub from: [f64; 2],
     /// `m`, half way between both ends.
     pub middle: [f64; 2],
-    /// The rows of `u` at the first of both ends, free of the flow's noise, and of `w` half way.
+    /// The rows of `u` at the first of both ends and of `w` half way.
     pub rows: Rows,
     /// `eta_2' - eta_1'`.
     pub left: Vector2<f64>,
@@ -202,7 +186,7 @@ impl Derotation {
         let turning = self.rotation_rows(&from, &g, &left);
         let rows = Rows { g: g * self.mean, r: turning * self.mean };
         let flow = left + turning * self.rotation;
-        Some(DerotatedFlow { middle, rows, left, flow, spread, first: at_first })
+        Some(DerotatedFlow { from: from.into(), middle, rows, left, flow, spread, first: at_first })
     }
 
     /// The displacement over the whole frame of a point of the first view, on the plane at distance 1, whose
@@ -229,21 +213,20 @@ impl Derotation {
 
     /// Inverse depths half way in time from those in the rows, for the translation `u`.
     pub fn half_way(&self, u: &Vector3<f64>) -> MidpointDepth {
-        MidpointDepth { ahead: self.lag * self.rotation.cross(u).z + self.middle(u).ahead }
+        MidpointDepth { ahead: self.lag * self.rotation.cross(u).z - 0.5 * (self.mean * u).z }
     }
 
-    /// Those half way between both ends.
-    pub fn middle(&self, u: &Vector3<f64>) -> MidpointDepth {
-        MidpointDepth { ahead: -0.5 * (self.mean * u).z }
+    /// Those at the first end.
+    pub fn first_end(&self, u: &Vector3<f64>) -> MidpointDepth {
+        MidpointDepth { ahead: -(self.mean * u).z }
     }
 }
 
-/// From inverse depths in rows that a rotation was taken out of to those half way in time.
+/// From inverse depths in rows that a rotation was taken out of to those at another time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct MidpointDepth {
-    /// How much farther along the optical axis a point is there than at the second end, in units of `|u|`:
-    /// `(X_1' + X_2') / 2 = X_2' - t / 2` half way between both ends, and half way in time `(X_1' + X_2') / 2
-    /// + (1 - cos(a / 2)) / a^2 (w x u)`.
+    /// How much farther along the optical axis a point is then than at the second end, in units of `|u|`:
+    /// `X_1' = X_2' - t`, and half way in time `X_2' - t / 2 + (1 - cos(a / 2)) / a^2 (w x u)`.
     ahead: f64,
 }
 

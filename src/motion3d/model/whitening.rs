@@ -1,15 +1,12 @@
 //! Whitens given points: rows with unit noise covariance.
 
 use super::input::{Flow, Noise, Placement, to_plane};
-use super::observations::{Observations, Row};
-use super::rows::{Derotation, Rows, tangents};
-use crate::math::quantile;
+use super::observations::{CHUNK, Observations, Row};
+use super::rows::{Derotation, Rows};
+use crate::math::{quantile, tangents};
 use crate::types::Intrinsics;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, SVector, Vector2, Vector3};
 use rayon::prelude::*;
-
-/// Fewest points of a task.
-pub(crate) const TOGETHER: usize = 1024;
 
 /// What was given, to be whitened as often as another rotation is taken out of its displacements.
 #[derive(Clone)]
@@ -45,18 +42,18 @@ impl<'a> Whitening<'a> {
     pub fn whitened(&self) -> Observations {
         let sources: Vec<u32> = (0..self.flow.len() as u32).collect();
         let one = |&k: &u32| Some((self.row(k as usize, None)?, k));
-        let usable: Vec<_> = sources.par_iter().with_min_len(TOGETHER).filter_map(one).collect();
+        let usable: Vec<_> = sources.par_iter().with_min_len(CHUNK).filter_map(one).collect();
         let (rows, source): (Vec<(Row, [f64; 3])>, Vec<u32>) = usable.into_iter().unzip();
-        let (rows, position): (Vec<Row>, Vec<[f64; 3]>) = rows.into_iter().unzip();
+        let (rows, eta): (Vec<Row>, Vec<[f64; 3]>) = rows.into_iter().unzip();
         let spherical = matches!(self.flow, Flow::Sphere { .. });
-        let mut out = Observations::new(&rows, position, spherical, source);
+        let mut out = Observations::new(&rows, eta, spherical, source);
         out.displaced = self.placement == Placement::Midpoint && !spherical;
         if let Flow::Plane { points, camera, .. } = self.flow {
             let given = out.source.iter().map(|&k| points[k as usize]);
             let place = given.map(|at| camera.map_or(at, |camera| camera.to_plane(at)));
             out.site = place.map(|[x, y]| [x, y, 0.0]).collect();
         } else {
-            out.site.clone_from(&out.position);
+            out.site.clone_from(&out.eta);
         }
         out
     }
@@ -66,14 +63,10 @@ impl<'a> Whitening<'a> {
     pub fn derotated(&self, points: &Observations, turn: Derotation) -> Observations {
         let nothing = Row { g: Matrix2x3::zeros(), r: Matrix2x3::zeros(), f: Vector2::zeros() };
         let one = |(&k, &before): (&u32, &[f64; 3])| self.row(k as usize, Some(&turn)).unwrap_or((nothing, before));
-        let (mut rows, mut position) = (Vec::new(), Vec::new());
-        let given = points.source.par_iter().zip(&points.position).with_min_len(TOGETHER);
-        given.map(one).unzip_into_vecs(&mut rows, &mut position);
-        let mut out = Observations::new(&rows, position, false, points.source.clone());
-        out.like(points);
-        out.site.clone_from(&points.site);
-        out.turn = Some(turn);
-        out
+        let (mut rows, mut eta) = (Vec::new(), Vec::new());
+        let given = points.source.par_iter().zip(&points.eta).with_min_len(CHUNK);
+        given.map(one).unzip_into_vecs(&mut rows, &mut eta);
+        points.derotated(&rows, eta, turn)
     }
 
     fn row(&self, k: usize, turn: Option<&Derotation>) -> Option<(Row, [f64; 3])> {
@@ -91,7 +84,7 @@ impl<'a> Whitening<'a> {
     }
 }
 
-/// A point of the picture, whitened, and its place `(x, y, 0)` on the plane at distance 1; with a `turn` as a
+/// A point of the picture, whitened, and its `eta = (x, y, 1)`; with a `turn` as a
 /// displacement with that rotation taken out. `covariance` in squared units of the flow.
 pub(crate) fn plane_row(
     point: [f64; 2],
@@ -108,13 +101,13 @@ pub(crate) fn plane_row(
     let (rows, flow, [x, y]) = if let Some(turn) = turn {
         let turned = turn.out_of(at(0.0), at(1.0))?;
         scale = turned.spread * scale;
-        (turned.rows, turned.flow, turned.middle)
+        (turned.rows, turned.flow, turned.from)
     } else {
         let at = at(if placement == Placement::Midpoint { 0.5 } else { 0.0 });
         (Rows::plane(at), scale * Vector2::from(flow), at)
     };
     let row = Row::whitened(&rows, flow, &(scale * covariance * scale.transpose()).symmetric_part())?;
-    (x.is_finite() && y.is_finite()).then_some((row, [x, y, 0.0]))
+    (x.is_finite() && y.is_finite()).then_some((row, [x, y, 1.0]))
 }
 
 /// Symmetric covariances. One that is a thousand times as precise as the better quarter is no measurement's:

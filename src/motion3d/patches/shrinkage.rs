@@ -4,21 +4,16 @@
 //! With few patches neither is the theory linear nor are the surfaces in the weights known: the scene that
 //! was found is measured again with new noise and solved again (the bootstrap, B. Efron 1979).
 
-use super::system::System;
-use crate::math::quantile;
-use crate::math::random::CounterRng;
-use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::rows::{Matrix5, tangents};
+use super::system::PatchSystem;
+use crate::math::{quantile, random::CounterRng, tangents};
+use crate::motion3d::model::{motion::Motion, observations::SAMPLE, rows::Matrix5};
 use crate::motion3d::solver::covariance::{PLAUSIBLE, inverse, plugged};
 use crate::motion3d::solver::efficient::{FARTHEST, ROUNDS};
+use crate::motion3d::solver::refine::StoppingCriteria;
 use nalgebra::{Matrix3, Vector3, Vector6};
 use rayon::prelude::*;
 
-/// Most steps of expectation and maximisation, and of the solution.
-const STEPS: usize = 60;
-
-/// Patches from which on the linear theory does, and repetitions of fewer.
-const MANY: usize = 30;
+/// Repetitions of few patches.
 const REPETITIONS: u64 = 200;
 
 /// The solution with the surfaces in its weights.
@@ -41,7 +36,7 @@ fn posterior_means(surfaces: &[(Vector3<f64>, Matrix3<f64>)]) -> Option<Vec<Vect
     let mut mean = weights.try_inverse()? * mean;
     let mut spread = Matrix3::from_diagonal(&Vector3::repeat(mean.norm_squared().max(f64::MIN_POSITIVE)));
     let mut posterior: Vec<(Vector3<f64>, Matrix3<f64>)> = Vec::new();
-    for _ in 0..STEPS {
+    for _ in 0..StoppingCriteria::FULL.steps {
         posterior.clear();
         for (surface, covariance) in surfaces {
             let gain = spread * (spread + covariance).try_inverse()?;
@@ -56,10 +51,10 @@ fn posterior_means(surfaces: &[(Vector3<f64>, Matrix3<f64>)]) -> Option<Vec<Vect
 }
 
 /// Solves `sum D(lambda~)^t e = 0` from `start`; `None` where that fails or leads far away.
-pub(crate) fn shrunk(system: &System, start: &Motion) -> Option<Shrunk> {
+pub(crate) fn shrunk(system: &PatchSystem, start: &Motion) -> Option<Shrunk> {
     let mut found = Shrunk { motion: *start, surfaces: Vec::new() };
     for _ in 0..ROUNDS {
-        let seen = system.patches.iter().map(|patch| patch.seen(&found.motion));
+        let seen = system.all.iter().map(|patch| patch.seen(&found.motion));
         found.surfaces = posterior_means(&seen.map(|seen| (seen.surface, seen.covariance)).collect::<Vec<_>>())?;
         found.motion = solve(system, &found.motion, &found.surfaces)?;
         if found.motion.angle_to(start).to_degrees() > FARTHEST {
@@ -71,9 +66,9 @@ pub(crate) fn shrunk(system: &System, start: &Motion) -> Option<Shrunk> {
 
 /// Scoring steps, with the expected slope of the equation. Where the epipole lies among patches the actual
 /// slope is another: after a step that grows they are half as long.
-fn solve(system: &System, start: &Motion, surfaces: &[Vector3<f64>]) -> Option<Motion> {
+fn solve(system: &PatchSystem, start: &Motion, surfaces: &[Vector3<f64>]) -> Option<Motion> {
     let (mut motion, mut share, mut before) = (*start, 1.0, f64::INFINITY);
-    for _ in 0..STEPS {
+    for _ in 0..StoppingCriteria::FULL.steps {
         let tangent = tangents(&motion.u());
         let here = system.equations(&motion, &tangent, Some(surfaces));
         let step = here.h.cholesky()?.solve(&here.gradient);
@@ -97,13 +92,13 @@ fn solve(system: &System, start: &Motion, surfaces: &[Vector3<f64>]) -> Option<M
 /// What the covariance of a motion with these surfaces is to be multiplied with, at least 1, for its 95 %
 /// ellipsoid to hold; `weighted`: solved with drawn surfaces in the weights.
 pub(crate) fn covariance_factor(
-    system: &System,
+    system: &PatchSystem,
     motion: &Motion,
     surfaces: &[Vector3<f64>],
     weighted: bool,
     rng: CounterRng,
 ) -> f64 {
-    if system.patches.len() >= MANY {
+    if system.all.len() >= SAMPLE {
         return 1.0;
     }
     let repeated = |i: u64| distance(&again(system, motion, surfaces, rng.stream(i)), motion, weighted);
@@ -112,9 +107,9 @@ pub(crate) fn covariance_factor(
 }
 
 /// The same patches with new noise.
-fn again(system: &System, motion: &Motion, surfaces: &[Vector3<f64>], rng: CounterRng) -> System {
+fn again(system: &PatchSystem, motion: &Motion, surfaces: &[Vector3<f64>], rng: CounterRng) -> PatchSystem {
     let mut out = system.clone();
-    for (k, (patch, surface)) in out.patches.iter_mut().zip(surfaces).enumerate() {
+    for (k, (patch, surface)) in out.all.iter_mut().zip(surfaces).enumerate() {
         let noise = Vector6::from_fn(|i, _| rng.normal((6 * k + i) as u64));
         patch.f = patch.predicted(motion, surface) + noise;
     }
@@ -122,7 +117,7 @@ fn again(system: &System, motion: &Motion, surfaces: &[Vector3<f64>], rng: Count
 }
 
 /// The squared error of what is found, in units of its own covariance; infinite where nothing is.
-fn distance(system: &System, truth: &Motion, weighted: bool) -> f64 {
+fn distance(system: &PatchSystem, truth: &Motion, weighted: bool) -> f64 {
     let likeliest = system.refine(truth);
     let found = || -> Option<(Motion, Matrix5)> {
         if !weighted {

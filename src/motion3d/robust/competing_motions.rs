@@ -9,19 +9,17 @@ use super::outlier_posterior::{ROUNDS, SETTLED, posterior, weighted};
 use super::search::{graduated, robust_motions};
 use super::two_motions::MIN_TESTED;
 use super::{APART, Candidates, INLIER, MAJORITY, cheaper_sign, inliers_of, settle, truncated};
-use crate::math::random::CounterRng;
+use crate::math::{random::CounterRng, tangents};
 use crate::motion3d::kernels::equations;
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::{Observations, UNKNOWNS};
-use crate::motion3d::model::options::Smoother;
+use crate::motion3d::model::observations::{Observations, ROUND, UNKNOWNS};
 use crate::motion3d::model::result::Alternative;
-use crate::motion3d::model::rows::tangents;
 use crate::motion3d::solver::covariance::{direction_deviation, inverse};
+use crate::motion3d::solver::depth_smoother;
 use crate::motion3d::solver::efficient::solve;
 use crate::motion3d::solver::likelihood::cost_of;
-use crate::motion3d::solver::profile_likelihood::ROUND;
-use crate::motion3d::solver::smoothing::DepthSmoother;
 use crate::motion3d::solver::starts::at_most;
+use crate::scattered::Smoother;
 use rayon::prelude::*;
 
 /// Maximum number of outliers among which a second motion is searched.
@@ -219,7 +217,7 @@ fn is_one_region(observations: &Observations, cells: &DepthConsistency<'_>, fitt
 /// units of `sqrt(n)`.
 fn rougher(observations: &Observations, scene: &[u32], motions: [&Motion; 2], rng: CounterRng) -> f64 {
     let points = observations.subset(scene);
-    let smoother = DepthSmoother::new(&points, Smoother::Auto, rng);
+    let smoother = depth_smoother(&points, Smoother::Auto, rng);
     let [first, second] = motions.map(|motion| cost_of(&points, &smoother, motion));
     (second - first) / (points.n as f64).sqrt()
 }

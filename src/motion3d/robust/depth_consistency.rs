@@ -6,11 +6,10 @@
 
 use super::outlier_posterior::{BAND, DOUBLING, OutlierPosterior};
 use super::{Consensus, INLIER};
-use crate::math::kd_tree::Tree;
 use crate::math::{median, quantile};
 use crate::motion3d::kernels::{Depths, depths};
-use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::{motion::Motion, observations::Observations};
+use crate::scattered::Tree;
 use std::ops::Range;
 
 /// Neighbours that a depth is compared with, and whose share of rejected ones is looked at.

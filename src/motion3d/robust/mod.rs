@@ -18,8 +18,7 @@ mod search;
 mod two_motions;
 
 use crate::ablation::keeps;
-use crate::math::random::CounterRng;
-use crate::math::truncated_std;
+use crate::math::{random::CounterRng, truncated_std};
 use crate::motion3d::kernels::depths;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, Scaled, UNKNOWNS};
@@ -44,18 +43,14 @@ const INLIER: f64 = 3.0;
 const APART: f64 = 10.0;
 
 /// When a motion of a set of inliers that is not final is reached.
-const STOPPING: StoppingCriteria = StoppingCriteria { steps: 60, tolerance: 1e-10, deviations: 1e-2 };
+const STOPPING: StoppingCriteria = StoppingCriteria { deviations: 1e-2, ..StoppingCriteria::FULL };
 
 /// A relative change of the noise that does not change the inliers.
 const SETTLED_NOISE: f64 = 0.02;
 
-/// Rounds towards a fixed set of inliers.
+/// Rounds towards a fixed set of inliers, towards the noise of few points, and of the depth-consistency test.
 const ROUNDS: usize = 10;
-
-/// Rounds towards the noise of few points.
 const FEW_ROUNDS: usize = 4;
-
-/// Rounds of the depth-consistency test.
 const DEPTH_ROUNDS: usize = 2;
 
 /// Share of outliers among the inliers from which on they matter for the search.
@@ -65,8 +60,7 @@ const MATTER: f64 = 0.03;
 /// the scene's is undecided.
 const MAJORITY: f64 = 0.1;
 
-/// Below so many points a few of them can agree by chance far better than the noise of all is: see
-/// [`single_noise`].
+/// Below so many points a few of them can agree by chance far better than the noise of all is.
 const SELECTED: usize = 100;
 
 /// By how much, in nats, outliers must shorten the description of the residuals to be believed.
@@ -96,7 +90,7 @@ impl Consensus {
     }
 }
 
-/// Candidates for the motion with the most inliers, each with its truncated cost; the cheapest first.
+/// Motions with their truncated costs, the cheapest first.
 type Candidates = Vec<(Motion, f64)>;
 
 /// Returns the motion with the most inliers, and competing motions. Points are then in units of the estimated
@@ -118,18 +112,17 @@ fn with_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: CounterRng) -
         return in_noise(whitening, scaled, false, rng);
     }
     let few = keeps("motion3d.single_noise") && scaled.observations.n < SELECTED;
-    let single_noise = few.then(|| noise::noise_std(whitening, &scaled.observations, rng)).flatten();
-    let single_noise = single_noise.map(|noise_std| noise_std * scaled.noise_std);
+    let of_all = few.then(|| noise::noise_std(whitening, &scaled.observations, rng)).flatten();
+    let of_all = of_all.map(|noise_std| noise_std * scaled.noise_std);
     scaled.take(noise::FIRST_SHARE * scaled.observations.median_flow());
     let found = in_noise(whitening, scaled, true, rng)?;
-    let Some(noise_std) = single_noise.map(|noise_std| noise_std / scaled.noise_std) else { return Some(found) };
-    let shorter = noise::shortening(&scaled.observations, &found, noise_std);
-    if shorter < SURE {
-        scaled.take(noise_std);
-        let found = in_noise(whitening, scaled, false, rng)?;
-        return Some(Consensus { shorter: Some(shorter), ..found });
+    let Some(of_all) = of_all.map(|noise_std| noise_std / scaled.noise_std) else { return Some(found) };
+    let shorter = noise::shortening(&scaled.observations, &found, of_all);
+    if shorter >= SURE {
+        return Some(found);
     }
-    Some(found)
+    scaled.take(of_all);
+    Some(Consensus { shorter: Some(shorter), ..in_noise(whitening, scaled, false, rng)? })
 }
 
 /// One search in the present noise, which is estimated again from the best candidate's residuals if it is
@@ -160,9 +153,7 @@ fn in_noise(whitening: &Whitening<'_>, scaled: &mut Scaled, unknown: bool, rng: 
             candidates = searched(&on, rng)?;
             continue;
         }
-        let again = |(motion, _): &(Motion, f64)| cheaper_sign(&on, graduated(&on, *motion, INLIER));
-        candidates = candidates.iter().map(again).collect();
-        candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+        candidates = cheapest(&on, candidates.iter().map(|(motion, _)| graduated(&on, *motion, INLIER)));
     }
     of_candidates(&scaled.observations, candidates, rng)
 }
@@ -172,7 +163,7 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
     let on = &*search_sample(observations, rng);
     if keeps("motion3d.second_motion") {
         candidates.extend(second(on, candidates.first()?.0, rng.stream(10)));
-        candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
+        sort(&mut candidates);
     }
     let mut competing = competing_motions(on, &candidates);
     let mut found = settle(observations, candidates.first()?.0)?;
@@ -212,12 +203,21 @@ fn search_sample(observations: &Observations, rng: CounterRng) -> Cow<'_, Observ
     at_most(observations, SEARCHED, rng.stream(9))
 }
 
-/// Motions with many inliers, the cheapest first.
+/// Motions with many inliers; `None` where there are none.
 fn searched(observations: &Observations, rng: CounterRng) -> Option<Candidates> {
-    let found = robust_motions(observations, STARTS, rng);
-    let mut all: Candidates = found.into_iter().map(|motion| cheaper_sign(observations, motion)).collect();
-    all.sort_by(|a, b| a.1.total_cmp(&b.1));
-    (!all.is_empty()).then_some(all)
+    let found = cheapest(observations, robust_motions(observations, STARTS, rng).into_iter());
+    (!found.is_empty()).then_some(found)
+}
+
+/// Motions with their better signs.
+fn cheapest(observations: &Observations, motions: impl Iterator<Item = Motion>) -> Candidates {
+    let mut all = motions.map(|motion| cheaper_sign(observations, motion)).collect();
+    sort(&mut all);
+    all
+}
+
+fn sort(candidates: &mut Candidates) {
+    candidates.sort_by(|a, b| a.1.total_cmp(&b.1));
 }
 
 /// The sign with the lower truncated cost, and that.

@@ -6,15 +6,14 @@
 
 use super::{Consensus, INLIER};
 use crate::ablation::keeps;
-use crate::math::random::CounterRng;
-use crate::math::{TRUNCATED_INFORMATION, median, truncated_std};
-use crate::motion3d::kernels::{depths, slopes};
+use crate::math::{TRUNCATED_INFORMATION, binomial_tail, median, random::CounterRng, truncated_std};
+use crate::motion3d::kernels::{add_to_rotation, depths, slopes};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, UNKNOWNS};
 use crate::motion3d::model::result::MotionEstimate;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::model::whitening::Whitening;
-use crate::motion3d::solver::covariance::inverse;
+use crate::motion3d::solver::covariance::{direction_deviation, inverse};
 use crate::motion3d::solver::finite_rotation::settle;
 use crate::motion3d::solver::likelihood::minima;
 use nalgebra::Matrix2x3;
@@ -39,14 +38,10 @@ pub(crate) fn larger(observations: &Observations, motion: &Motion) -> f64 {
 /// Estimates the noise of all points if all are inliers of one motion.
 pub(crate) fn noise_std(whitening: &Whitening<'_>, observations: &Observations, rng: CounterRng) -> Option<f64> {
     let mut found = minima(observations, rng.stream(20));
-    if found.is_empty() {
-        return None;
-    }
-    let mut points = observations.clone();
-    settle(whitening, &mut points, &mut found);
-    let best = found.first()?.equations.cost;
-    let degrees = observations.n.saturating_sub(UNKNOWNS).max(1);
-    Some((best / degrees as f64).sqrt()).filter(|noise_std| noise_std.is_finite() && *noise_std > 0.0)
+    settle(whitening, &mut observations.clone(), &mut found);
+    let degrees = observations.n.saturating_sub(UNKNOWNS).max(1) as f64;
+    let noise_std = (found.first()?.equations.cost / degrees).sqrt();
+    (noise_std.is_finite() && noise_std > 0.0).then_some(noise_std)
 }
 
 /// By how much the mean square may exceed what the median says of it.
@@ -84,8 +79,8 @@ pub(crate) fn shortening(observations: &Observations, found: &Consensus, noise_s
 /// From so many inliers on no few of them decide.
 const MANY: usize = 300;
 
-/// The share of cases in which no more outliers than assumed fit by chance.
-const SURE: f64 = 0.95;
+/// The chance that more outliers than assumed fit.
+const MORE: f64 = 0.05;
 
 /// By how much the standard deviation may grow without the points that may be outliers.
 const MAX_GROWTH: f64 = 2.0;
@@ -96,51 +91,31 @@ const MAX_GROWTH: f64 = 2.0;
 /// Outliers spread evenly have twice the median residual of the rejected as their range; `3 / (2 median)` of
 /// them fall within three standard deviations.
 pub(crate) fn has_high_leverage(observations: &Observations, found: &MotionEstimate) -> bool {
-    let inliers: Vec<usize> = (0..observations.n).filter(|&k| found.inliers[observations.source[k] as usize]).collect();
-    let rejected = observations.n - inliers.len();
-    if !keeps("motion3d.leverage") || rejected == 0 || inliers.len() >= MANY {
+    let is_inlier = |k: &usize| found.inliers[observations.source[*k] as usize];
+    let (inliers, rejected): (Vec<usize>, Vec<usize>) = (0..observations.n).partition(is_inlier);
+    if !keeps("motion3d.leverage") || rejected.is_empty() || inliers.len() >= MANY {
         return false;
     }
-    let chance = chance(observations, &found.motion, |k| found.inliers[observations.source[k] as usize]);
-    let suspects = most_likely(chance * rejected as f64);
+    let seen = depths(observations, &found.motion);
+    let mut sizes: Vec<f64> = rejected.iter().map(|&k| seen.e[k].abs() / observations.own()).collect();
+    let chance = INLIER / (2.0 * median(&mut sizes).unwrap_or(0.0).max(INLIER));
+    let all = rejected.len();
+    let suspects = (0..all.min(MANY)).find(|count| binomial_tail(count + 1, all, chance) < MORE);
     let tangent = Matrix2x3::from_fn(|i, j| found.tangent[i][j]);
     let depth = |k: usize| found.inverse_depth_smooth[observations.source[k] as usize];
     let row = |&k: &usize| slopes(observations, &found.motion, &tangent, depth(k), k);
     let rows: Vec<Vector5> = inliers.iter().map(row).collect();
-    grows(&rows, observations, suspects)
-}
-
-/// The share of outliers that are on their epipolar lines by chance, if they are spread evenly over twice
-/// the median residual of the rejected.
-fn chance(observations: &Observations, motion: &Motion, is_inlier: impl Fn(usize) -> bool) -> f64 {
-    let seen = depths(observations, motion);
-    let mut sizes: Vec<f64> =
-        (0..observations.n).filter(|&k| !is_inlier(k)).map(|k| seen.e[k].abs() / observations.own()).collect();
-    INLIER / (2.0 * median(&mut sizes).unwrap_or(0.0).max(INLIER))
-}
-
-/// The number that a Poisson variable of this mean exceeds in no more than 5 % of all cases.
-fn most_likely(mean: f64) -> usize {
-    let (mut term, mut count) = ((-mean).exp(), 0);
-    let mut sum = term;
-    while sum < SURE && count < MANY {
-        count += 1;
-        term *= mean / count as f64;
-        sum += term;
-    }
-    count
+    grows(&rows, observations, suspects.unwrap_or(all))
 }
 
 /// Repeatedly removes the row without which the standard deviation grows most; whether it grows too much.
 fn grows(rows: &[Vector5], observations: &Observations, suspects: usize) -> bool {
     let mut information: Matrix5 = rows.iter().map(|row| row * row.transpose()).sum();
     if let Some(known) = &observations.prior {
-        let mut block = information.fixed_view_mut::<3, 3>(2, 2);
-        block += known.information;
+        add_to_rotation(&mut information, &known.information, 1.0);
     }
     let Some(mut covariance) = inverse(&information) else { return true };
-    let trace = |covariance: &Matrix5| covariance[(0, 0)] + covariance[(1, 1)];
-    let limit = MAX_GROWTH * MAX_GROWTH * trace(&covariance);
+    let limit = MAX_GROWTH * direction_deviation(&covariance);
     let mut left: Vec<&Vector5> = rows.iter().collect();
     for _ in 0..suspects.min(rows.len()) {
         // Without a row: `C + C d d^t C / (1 - d^t C d)`.
@@ -154,7 +129,7 @@ fn grows(rows: &[Vector5], observations: &Observations, suspects: usize) -> bool
         left.swap_remove(worst);
         let Some(next) = inverse(&information) else { return true };
         covariance = next;
-        if trace(&covariance) > limit {
+        if direction_deviation(&covariance) > limit {
             return true;
         }
     }

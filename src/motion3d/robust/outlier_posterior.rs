@@ -11,13 +11,10 @@
 //! mean of `g e^2 D^t D` by parts. Least squares on a fixed set of points treat outliers as inliers.
 
 use super::{Consensus, INLIER};
-use crate::math::binomial_tail;
-use crate::motion3d::kernels::{depths, information};
-use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::{Matrix5, carried};
-use crate::motion3d::solver::covariance::PLAUSIBLE;
-use crate::motion3d::solver::efficient::solve;
+use crate::math::{binomial_tail, carried};
+use crate::motion3d::kernels::{Weighted, depths, information};
+use crate::motion3d::model::{motion::Motion, observations::Observations, rows::Matrix5};
+use crate::motion3d::solver::{covariance::PLAUSIBLE, efficient::solve};
 use nalgebra::Matrix2x3;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -210,11 +207,11 @@ pub(crate) fn weighted_by_posterior(
     };
     let informed = |motion: &Motion, tangent: &Matrix2x3<f64>| {
         let share = |k: usize, density: f64| odds(k).map(|odds| posterior(&odds, density) * odds.information);
-        information(&weighted(all, motion, share), motion, tangent, &nu(motion), 0.0)
+        information(&weighted(all, motion, share), &Weighted { motion, tangent, nu: &nu(motion) }, 0.0)
     };
     let inner = all.subset(&known.inliers);
     let own = smooth.map_or_else(|| Cow::Owned(depths(&inner, from).nu), Cow::Borrowed);
-    let before = information(&inner, from, tangent, &own, 0.0).cholesky()?.l().transpose();
+    let before = information(&inner, &Weighted { motion: from, tangent, nu: &own }, 0.0).cholesky()?.l().transpose();
     let near = |motion: &Motion| {
         let off = motion.offset(from, tangent);
         off.dot(&(informed(from, tangent) * off)) < PLAUSIBLE

@@ -5,8 +5,7 @@ use super::{APART, INLIER};
 use crate::math::random::CounterRng;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{ALIGN, LESS_ROUND, Observations};
-use crate::motion3d::solver::refine::{StoppingCriteria, refine_cut};
-use crate::motion3d::solver::starts::{apart, evaluate};
+use crate::motion3d::solver::{refine::StoppingCriteria, refine::refine_cut, starts::apart, starts::evaluate};
 use crate::simd::{Kernel, Lanes, dispatch};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -50,19 +49,6 @@ impl Kernel<f64> for TruncatedCost<'_> {
     }
 }
 
-/// Three different indices below `n`.
-fn triple(n: usize, rng: CounterRng) -> [usize; 3] {
-    let draw = |place: u64, from: usize| (rng.uniform(place) * from as f64) as usize;
-    // Each is drawn among those left: indices not below an earlier one move up.
-    let first = draw(0, n);
-    let second = draw(1, n - 1);
-    let second = second + usize::from(second >= first);
-    let third = draw(2, n - 2);
-    let (low, high) = (first.min(second), first.max(second));
-    let third = third + usize::from(third >= low);
-    [first, second, third + usize::from(third >= high)]
-}
-
 /// Every direction with its best rotation and cost `sum min((e / bound)^2, 1)`. The spacing of the directions
 /// leaves residuals in proportion to flow: a point's bound is the share `spacing` of its flow, at least
 /// `least`.
@@ -70,7 +56,7 @@ fn search(observations: &Observations, least: f64, spacing: f64, rng: CounterRng
     let chosen = rng.stream(0).sample(observations.n, SEARCHED);
     let few: Vec<_> = chosen.iter().map(|&k| observations.row(k as usize)).collect();
     let draws = rng.stream(1);
-    let triples: Vec<[usize; 3]> = (0..SAMPLES as u64).map(|i| triple(few.len(), draws.stream(i))).collect();
+    let triples: Vec<[usize; 3]> = (0..SAMPLES as u64).map(|i| draws.stream(i).three(few.len())).collect();
     let (floor, level) = (observations.floor, observations.level);
     let bounds: Vec<f64> = few.iter().map(|row| least.max(spacing * row.f.norm())).collect();
     evaluate(|u| {
@@ -131,22 +117,4 @@ pub(crate) fn graduated(observations: &Observations, start: Motion, bound: f64) 
         cut /= CUT_RATIO;
     }
     refine_cut(observations, motion, INLIER, StoppingCriteria { steps: 30, tolerance: 1e-7, deviations: 0.0 }).motion
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn triples_are_different_and_reach_every_index() {
-        let mut seen = [false; 7];
-        for i in 0..200 {
-            let [a, b, c] = triple(7, CounterRng::new(i));
-            assert!(a != b && b != c && a != c);
-            for index in [a, b, c] {
-                seen[index] = true;
-            }
-        }
-        assert!(seen.iter().all(|&seen| seen));
-    }
 }

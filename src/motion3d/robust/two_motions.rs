@@ -3,17 +3,15 @@
 //! A moving object and the scene may fit a third motion together with residuals as small as noise, but those
 //! of each pull the estimate another way: a score test of parts of the picture shows it.
 
-use super::search::robust_motions;
-use super::{APART, INLIER, cheaper_sign, truncated};
-use crate::math::chi2_deviation;
-use crate::math::kd_tree::{Neighbours, Tree};
-use crate::math::random::CounterRng;
+use super::{APART, INLIER, cheaper_sign, search::robust_motions, truncated};
+use crate::math::{chi2_deviation, random::CounterRng};
 use crate::motion3d::kernels::{depths, slopes};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{Observations, UNKNOWNS};
 use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
-use crate::motion3d::solver::refine::{StoppingCriteria, refine};
+use crate::motion3d::solver::{refine::StoppingCriteria, refine::refine};
+use crate::scattered::{Neighbours, Tree};
 use nalgebra::SymmetricEigen;
 use std::ops::Range;
 

@@ -1,10 +1,8 @@
 //! Covariances of a motion: maximum likelihood's and the bound.
 
-use crate::motion3d::kernels::information;
-use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::Matrix5;
-use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen};
+use crate::motion3d::kernels::{Weighted, information};
+use crate::motion3d::model::{observations::Observations, rows::Matrix5};
+use nalgebra::{Matrix2, SymmetricEigen};
 
 /// Least eigenvalue of the information without the depths' noise, relative to that with it, that is still
 /// known to be positive.
@@ -72,17 +70,8 @@ pub(crate) fn direction_deviation(covariance: &Matrix5) -> f64 {
     direction_block(covariance).trace().max(0.0).sqrt().to_degrees()
 }
 
-/// The larger variance of the direction, rad^2.
-pub(crate) fn direction_spread(covariance: &Matrix5) -> f64 {
-    SymmetricEigen::new(direction_block(covariance)).eigenvalues.max()
-}
-
 /// `kappa^2`, the larger variance of the direction: within that of the epipole weights are damped.
-pub(crate) fn damping(
-    observations: &Observations,
-    motion: &Motion,
-    tangent: &Matrix2x3<f64>,
-    nu: &[f64],
-) -> Option<f64> {
-    inverse(&information(observations, motion, tangent, nu, 0.0)).map(|covariance| direction_spread(&covariance))
+pub(crate) fn damping(observations: &Observations, at: &Weighted<'_>) -> Option<f64> {
+    let covariance = inverse(&information(observations, at, 0.0))?;
+    Some(SymmetricEigen::new(direction_block(&covariance)).eigenvalues.max())
 }

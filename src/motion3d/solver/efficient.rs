@@ -2,12 +2,11 @@
 
 use super::covariance::{PluginCovariances, damping, direction_deviation, inverse};
 use super::profile_likelihood::{ProfileLikelihood, among};
-use super::refine::{Minimum, root};
-use super::smoothing::{DepthSmoother, Smoothed};
-use crate::motion3d::kernels::{Bilinear, depths, information, slope};
-use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::{Matrix5, tangents};
+use super::refine::Minimum;
+use crate::math::{root, tangents};
+use crate::motion3d::kernels::{Bilinear, Weighted, depths, information, slope};
+use crate::motion3d::model::{motion::Motion, observations::Observations, rows::Matrix5};
+use crate::scattered::{SiteSmoother, Smoothed};
 use nalgebra::{Matrix2, Matrix2x3, SymmetricEigen};
 
 /// Times that depths are smoothed and the equation is solved.
@@ -34,14 +33,14 @@ pub(crate) struct Efficient {
 
 impl Efficient {
     /// The covariance with what a curved profile likelihood adds, and whether it describes that.
-    pub fn lengthened(&self, observations: &Observations, smoother: impl Fn() -> DepthSmoother) -> (Matrix5, bool) {
+    pub fn lengthened(&self, observations: &Observations, smoother: impl Fn() -> SiteSmoother) -> (Matrix5, bool) {
         let profile = ProfileLikelihood { observations, motion: &self.motion, tangent: &self.tangent };
         let mut made = None;
         profile.lengthened(&self.covariance, |motion: &Motion| {
             if self.variance.is_none() {
                 return self.smooth.clone();
             }
-            made.get_or_insert_with(&smoother).smooth(&depths(observations, motion)).nu
+            made.get_or_insert_with(&smoother).smooth(depths(observations, motion).measured()).value
         })
     }
 }
@@ -50,7 +49,7 @@ impl Efficient {
 #[derive(Debug)]
 pub(crate) enum WeightDepths<'a> {
     /// Smoothed again at each motion.
-    Smoothed(&'a mut DepthSmoother),
+    Smoothed(&'a mut SiteSmoother),
     /// Known from elsewhere, as long as the planes.
     Known(Vec<f64>),
 }
@@ -58,8 +57,8 @@ pub(crate) enum WeightDepths<'a> {
 impl WeightDepths<'_> {
     fn at(&mut self, observations: &Observations, motion: &Motion) -> Smoothed {
         match self {
-            Self::Smoothed(smoother) => smoother.smooth(&depths(observations, motion)),
-            Self::Known(nu) => Smoothed { nu: nu.clone(), share: vec![0.0; nu.len()], variance: Vec::new() },
+            Self::Smoothed(smoother) => smoother.smooth(depths(observations, motion).measured()),
+            Self::Known(nu) => Smoothed { value: nu.clone(), share: vec![0.0; nu.len()], variance: Vec::new() },
         }
     }
 
@@ -99,9 +98,9 @@ pub(crate) fn efficient(
         if round > 0 {
             smooth = weights.at(observations, &motion);
         }
-        smooth.nu.iter_mut().for_each(|nu| *nu *= unit);
+        smooth.value.iter_mut().for_each(|nu| *nu *= unit);
         let before = motion;
-        motion = solve(observations, &before, &smooth.nu)?;
+        motion = solve(observations, &before, &smooth.value)?;
         if motion.angle_to(start).to_degrees() > FARTHEST {
             return None;
         }
@@ -109,10 +108,11 @@ pub(crate) fn efficient(
             break;
         }
     }
-    let Smoothed { nu: smooth, share, variance } = smooth;
+    let Smoothed { value: smooth, share, variance } = smooth;
     let tangent = tangents(&motion.u());
     let share = matches!(weights, WeightDepths::Smoothed(_)).then_some(&share[..]);
-    let covariance = sandwich(observations, &motion, &tangent, &smooth, share)?;
+    let at = Weighted { motion: &motion, tangent: &tangent, nu: &smooth };
+    let covariance = sandwich(observations, &at, share)?;
     let (smooth, variance) = match weights {
         WeightDepths::Smoothed(_) => (smooth, Some(variance)),
         WeightDepths::Known(given) => (given, None),
@@ -124,10 +124,11 @@ pub(crate) fn efficient(
 pub(crate) fn covariance_at(
     observations: &Observations,
     motion: &Motion,
-    smoother: &mut DepthSmoother,
+    smoother: &mut SiteSmoother,
 ) -> Option<Matrix5> {
-    let smooth = smoother.smooth(&depths(observations, motion));
-    sandwich(observations, motion, &tangents(&motion.u()), &smooth.nu, Some(&smooth.share))
+    let smooth = smoother.smooth(depths(observations, motion).measured());
+    let at = Weighted { motion, tangent: &tangents(&motion.u()), nu: &smooth.value };
+    sandwich(observations, &at, Some(&smooth.share))
 }
 
 /// Eigenvalues that the slope may have relative to the weights' squares: beyond, the points' own depths are
@@ -140,18 +141,12 @@ const MIN_SLOPE_RATIO: f64 = 1e-3;
 /// `A^-1 B A^-t` with `B = sum W^t W` and the slope `A = sum W^t D` of the equation, with its damped weights:
 /// `B^-1` for weights with the right depths. `share`: how much of the points' own depths is in the weights;
 /// `None` for depths from elsewhere, free of the flow's noise.
-fn sandwich(
-    observations: &Observations,
-    motion: &Motion,
-    tangent: &Matrix2x3<f64>,
-    nu: &[f64],
-    share: Option<&[f64]>,
-) -> Option<Matrix5> {
-    let spread = damping(observations, motion, tangent, nu)?;
-    let squares = information(observations, motion, tangent, nu, spread);
+fn sandwich(observations: &Observations, at: &Weighted<'_>, share: Option<&[f64]>) -> Option<Matrix5> {
+    let spread = damping(observations, at)?;
+    let squares = information(observations, at, spread);
     let plain = inverse(&squares)?;
-    let none = if share.is_none() { vec![0.0; nu.len()] } else { Vec::new() };
-    let slope = slope(observations, motion, tangent, nu, share.unwrap_or(&none), spread);
+    let none = if share.is_none() { vec![0.0; at.nu.len()] } else { Vec::new() };
+    let slope = slope(observations, at, share.unwrap_or(&none), spread);
     let whiten = squares.cholesky()?.l().try_inverse()?;
     let relative = whiten * slope * whiten.transpose();
     let determined = if share.is_some() {
@@ -169,9 +164,8 @@ fn sandwich(
 
 /// The root of the equation whose weights, with the depths `nu`, are frozen at `start`.
 pub(crate) fn solve(observations: &Observations, start: &Motion, nu: &[f64]) -> Option<Motion> {
-    let tangent = tangents(&start.u());
-    let spread = damping(observations, start, &tangent, nu)?;
-    let equation = Bilinear::new(observations, start, &tangent, nu, spread);
+    let weights = Weighted { motion: start, tangent: &tangents(&start.u()), nu };
+    let equation = Bilinear::new(observations, &weights, damping(observations, &weights)?);
     let at = |motion: &Motion| equation.at(motion, &tangents(&motion.u()));
     root(*start, at, |motion, step| motion.stepped(&tangents(&motion.u()), step))
 }
@@ -213,7 +207,8 @@ mod tests {
         let tangent = tangents(&scene.motion.u());
         let mut nu = scene.inverse_depth.clone();
         nu.resize(observations.stride, 0.0);
-        let equation = Bilinear::new(&observations, &scene.motion, &tangent, &nu, 0.01);
+        let weights = Weighted { motion: &scene.motion, tangent: &tangent, nu: &nu };
+        let equation = Bilinear::new(&observations, &weights, 0.01);
         let at = Motion::new([0.5, 0.1, 0.8], [0.01, -0.02, 0.03]);
         let axes = tangents(&at.u());
         let (_, slope) = equation.at(&at, &axes);

@@ -6,11 +6,11 @@
 use super::likelihood::different;
 use super::refine::{Minimum, StoppingCriteria, refine};
 use super::starts::at_most;
-use crate::math::random::CounterRng;
+use crate::math::{random::CounterRng, tangents};
 use crate::motion3d::kernels::{Depths, depths, slopes};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::{Matrix5, Vector5, tangents};
+use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::model::whitening::Whitening;
 use rayon::prelude::*;
 use std::borrow::Cow;
@@ -18,11 +18,10 @@ use std::borrow::Cow;
 /// Points whose residuals are compared.
 const SAMPLED: usize = 256;
 
-/// A change of the rotation, rad, that is rounding.
-pub(crate) const ROUNDING: f64 = 1e-12;
-
-/// Most times that the rotation is taken out that was found the time before.
+/// Most times that the rotation is taken out that was found the time before, and a change of it, rad, that is
+/// rounding.
 pub(crate) const ROUNDS: usize = 6;
+pub(crate) const ROUNDING: f64 = 1e-12;
 
 /// Root mean square change of residuals, in units of noise, that changes few inliers.
 const MAX_CHANGE: f64 = 0.1;
@@ -94,7 +93,7 @@ pub(crate) fn with_own_rotation(whitening: &Whitening<'_>, points: &mut Observat
 
 /// Takes the rotation of the first of `found`, the minima of the points, out of them, and refines the others.
 pub(crate) fn settle(whitening: &Whitening<'_>, points: &mut Observations, found: &mut Vec<Minimum>) {
-    let mut first = found[0];
+    let Some(mut first) = found.first().copied() else { return };
     if is_another_rotation(points, &first.motion) {
         first = with_own_rotation(whitening, points, first.motion);
     }

@@ -1,17 +1,17 @@
 //! Maximum likelihood over all motions, and which of several minima it was.
 
 use super::covariance::direction_deviation;
+use super::depth_smoother;
 use super::efficient::{Efficient, WeightDepths, efficient};
 use super::refine::{FEWER, MANY, Minimum, StoppingCriteria, refine};
-use super::smoothing::DepthSmoother;
 use super::starts::starts;
-use crate::math::random::CounterRng;
+use crate::math::{random::CounterRng, tangents};
 use crate::motion3d::kernels::{depths, equations};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::options::{MotionOptions, Smoother};
+use crate::motion3d::model::options::MotionOptions;
 use crate::motion3d::model::result::Alternative;
-use crate::motion3d::model::rows::tangents;
+use crate::scattered::{SiteSmoother, Smoother};
 use rayon::prelude::*;
 
 /// Most minima of few points that are followed on all, and from which smoothed weights are tried.
@@ -62,7 +62,7 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
         let fewer = observations.subset(&rng.stream(1).sample(observations.n, FEWER));
         let rough: Vec<Minimum> =
             starts.into_par_iter().map(|start| refine(&fewer, start, StoppingCriteria::ROUGH)).collect();
-        let smoother = || DepthSmoother::new(&fewer, Smoother::Auto, rng.stream(6));
+        let smoother = || depth_smoother(&fewer, Smoother::Auto, rng.stream(6));
         let mut finalists = choose(&fewer, &different(rough), smoother).0;
         finalists.truncate(FINALISTS);
         let followed =
@@ -98,8 +98,8 @@ fn cost_tolerance(n: usize) -> f64 {
 pub(crate) fn choose(
     observations: &Observations,
     minima: &[Minimum],
-    smoother: impl FnOnce() -> DepthSmoother,
-) -> (Vec<Candidate>, Option<DepthSmoother>) {
+    smoother: impl FnOnce() -> SiteSmoother,
+) -> (Vec<Candidate>, Option<SiteSmoother>) {
     let mut candidates: Vec<Candidate> =
         minima.iter().map(|minimum| Candidate::signed(observations, minimum)).collect();
     candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -111,7 +111,7 @@ pub(crate) fn choose(
     }
     let smoother = smoother();
     for candidate in &mut rivals {
-        candidate.cost += smoother.cost(&depths(observations, &candidate.minimum.motion));
+        candidate.cost += smoother.cost(depths(observations, &candidate.minimum.motion).measured());
     }
     rivals.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     rivals.extend(others);
@@ -128,7 +128,7 @@ pub(crate) fn smoothed(
     inliers: &Observations,
     options: &MotionOptions,
     candidates: &[Candidate],
-    smoother: &mut DepthSmoother,
+    smoother: &mut SiteSmoother,
 ) -> Option<(Efficient, Option<Alternative>)> {
     let mut starts = near_best(candidates, inliers.n).iter().take(FINALISTS);
     if let Some(depths) = &options.weight_depths {
@@ -152,9 +152,9 @@ pub(crate) fn smoothed(
 }
 
 /// `J`, the depths behind the camera and the depth map's roughness.
-pub(crate) fn cost_of(observations: &Observations, smoother: &DepthSmoother, motion: &Motion) -> f64 {
+pub(crate) fn cost_of(observations: &Observations, smoother: &SiteSmoother, motion: &Motion) -> f64 {
     let at = equations(observations, motion, &tangents(&motion.u()), None);
-    at.cost + at.cheirality_cost() + smoother.cost(&depths(observations, motion))
+    at.cost + at.cheirality_cost() + smoother.cost(depths(observations, motion).measured())
 }
 
 /// The chosen minimum and those that come close to it.

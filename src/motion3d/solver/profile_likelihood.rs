@@ -7,21 +7,18 @@
 //! curvature of the profile and the covariance of the other unknowns there.
 
 use super::covariance::{damping, direction_block, direction_deviation, inverse};
-use super::refine::root;
 use super::starts::SEARCHED;
-use crate::motion3d::kernels::{Bilinear, information};
+use crate::math::{carried, root};
+use crate::motion3d::kernels::{Bilinear, Weighted, information};
 use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::{Matrix5, Vector5, carried};
+use crate::motion3d::model::observations::{Observations, ROUND};
+use crate::motion3d::model::rows::{Matrix5, Vector5};
 use nalgebra::{Matrix2x3, Matrix4, SMatrix, SymmetricEigen, Vector2, Vector3};
 
 /// Standard deviations of the direction, as shares of the field, below which the theory is linear enough;
 /// that where the epipole may lie among the points.
 const STRAIGHT: f64 = 0.08;
 const STRAIGHT_AMONG: f64 = 0.03;
-
-/// Times that noise may be as large along one axis as along the other to count as round.
-pub(crate) const ROUND: f64 = 6.0;
 
 /// The 0.95 quantile of chi squared with one degree of freedom.
 const END: f64 = 3.841;
@@ -127,8 +124,9 @@ impl ProfileLikelihood<'_> {
         let variance = covariance[(0, 0)];
         let slope: Vector4 = covariance.fixed_view::<4, 1>(1, 0) / variance;
         let nu = weights(self.motion);
-        let damped = damping(self.observations, self.motion, &along, &nu)?;
-        let here = others(&information(self.observations, self.motion, &along, &nu, damped))?;
+        let at = Weighted { motion: self.motion, tangent: &along, nu: &nu };
+        let damped = damping(self.observations, &at)?;
+        let here = others(&information(self.observations, &at, damped))?;
         let from = Course { axes: &along, slope, damped };
         let mut ends = [1.0, -1.0].map(|sign| self.end(&from, sign * variance.sqrt(), weights));
         let found: Vec<End> = ends.iter_mut().filter_map(Option::take).collect();
@@ -215,14 +213,15 @@ impl ProfileLikelihood<'_> {
         let start = moved(&guess).normalized();
         let there = carried(axes, &start.u());
         let nu = weights(&start);
-        let equation = Bilinear::new(self.observations, &start, &there, &nu, damped);
+        let at = Weighted { motion: &start, tangent: &there, nu: &nu };
+        let equation = Bilinear::new(self.observations, &at, damped);
         let of_others = |rest: &Vector4| {
             let (value, slopes) = equation.at(&moved(rest), axes);
             (value.fixed_rows::<4>(1).into_owned(), slopes.fixed_view::<4, 4>(1, 1).into_owned())
         };
         let rest = root(guess, of_others, |rest, step| rest + step)?;
         let motion = moved(&rest).normalized();
-        let squares = information(self.observations, &motion, &there, &nu, damped);
+        let squares = information(self.observations, &Weighted { motion: &motion, ..at }, damped);
         let (value, _) = equation.at(&motion, &there);
         let score = value[0] * value[0] * inverse(&squares)?[(0, 0)];
         (score > 0.0 && score.is_finite()).then_some((End { psi, rest, covariance: others(&squares)? }, score))

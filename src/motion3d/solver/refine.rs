@@ -1,10 +1,9 @@
-//! Levenberg-Marquardt on the five unknowns of a motion, and Newton's method for estimating equations.
+//! Levenberg-Marquardt on the five unknowns of a motion.
 
+use crate::math::tangents;
 use crate::motion3d::kernels::{Equations, equations};
-use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::rows::{Vector5, tangents};
-use nalgebra::{Matrix2x3, SMatrix, SVector};
+use crate::motion3d::model::{motion::Motion, observations::Observations, rows::Vector5};
+use nalgebra::{Matrix2x3, SMatrix};
 
 /// Points from which on there are many: so that a search takes no longer, it begins with fewer of them.
 pub(crate) const MANY: usize = 4000;
@@ -115,30 +114,6 @@ pub(crate) fn descend(
         }
     }
     here
-}
-
-/// Most Newton steps, and the length of one that is the last.
-const STEPS: usize = 30;
-const STEP: f64 = 1e-11;
-
-/// Newton's method: where the value that `at` gives with its slopes is zero, near `here`.
-pub(crate) fn root<const N: usize, S>(
-    mut here: S,
-    at: impl Fn(&S) -> (SVector<f64, N>, SMatrix<f64, N, N>),
-    moved: impl Fn(&S, &SVector<f64, N>) -> S,
-) -> Option<S> {
-    for _ in 0..STEPS {
-        let (value, slopes) = at(&here);
-        let step = slopes.try_inverse()? * -value;
-        if !step.iter().all(|value| value.is_finite()) {
-            return None;
-        }
-        here = moved(&here, &step);
-        if step.norm() < STEP {
-            return Some(here);
-        }
-    }
-    None
 }
 
 #[cfg(test)]

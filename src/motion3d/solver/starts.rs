@@ -1,11 +1,10 @@
 //! The search over directions: where on the half sphere the residuals are small.
 
-use super::refine::{StoppingCriteria, refine};
+use super::{refine::StoppingCriteria, refine::refine};
 use crate::ablation::keeps;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::best_rotation;
-use crate::motion3d::model::motion::Motion;
-use crate::motion3d::model::observations::Observations;
+use crate::motion3d::model::{motion::Motion, observations::Observations};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 use std::borrow::Cow;

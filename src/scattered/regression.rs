@@ -1,8 +1,7 @@
-//! Depths predicted from neighbours: leave-one-out local-linear regression, a point in every lane.
+//! Values predicted from neighbours: leave-one-out local-linear regression, a point in every lane.
 
-use crate::math::kd_tree::Neighbours;
-use crate::motion3d::model::observations::ALIGN;
-use crate::motion3d::model::rows::tangents;
+use super::tree::Neighbours;
+use crate::math::tangents;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use nalgebra::{Matrix2x3, Vector3};
 use rayon::prelude::*;
@@ -19,13 +18,16 @@ const RIDGE: f64 = 1e-9;
 /// Noise variance of a prediction that nothing is known for.
 pub(crate) const NO_PREDICTION: f64 = 1e30;
 
-/// What a regression needs of a point, by its place in the tree: where it is, its depth and the inverse
+/// Most lanes.
+const ALIGN: usize = 16;
+
+/// What a regression needs of a point, by its place in the tree: where it is, its value and the inverse
 /// variance of that.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Site {
     pub at: [f64; 3],
-    pub nu: f64,
-    pub s2: f64,
+    pub value: f64,
+    pub precision: f64,
 }
 
 /// Predictions `q` and the variances `c` that noise of the neighbours gives them.
@@ -47,7 +49,7 @@ struct Regress<'a> {
     c: &'a mut [f64],
 }
 
-/// A neighbour as a point sees it, in units of its reach: place, squared distance, depth and its precision.
+/// A neighbour as a point sees it, in units of its reach: place, squared distance, value and its precision.
 #[inline(always)]
 fn seen_from(from: &Site, site: &Site, axes: Option<&Matrix2x3<f64>>, scale: f64) -> [f64; 5] {
     let d = [0, 1, 2].map(|i| (site.at[i] - from.at[i]) * scale);
@@ -55,7 +57,7 @@ fn seen_from(from: &Site, site: &Site, axes: Option<&Matrix2x3<f64>>, scale: f64
         None => [d[0], d[1]],
         Some(e) => [0, 1].map(|i| e[(i, 0)] * d[0] + e[(i, 1)] * d[1] + e[(i, 2)] * d[2]),
     };
-    [x, y, d[0] * d[0] + d[1] * d[1] + d[2] * d[2], site.nu, site.s2]
+    [x, y, d[0] * d[0] + d[1] * d[1] + d[2] * d[2], site.value, site.precision]
 }
 
 impl Kernel<f64> for Regress<'_> {
@@ -80,7 +82,7 @@ impl Kernel<f64> for Regress<'_> {
                 let reach = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
                 scale[lane] = if reach > 0.0 { 1.0 / reach } else { 0.0 };
             }
-            // Sums over neighbours: X^t Omega X, X^t Omega nu, X^t Omega V Omega X with rows (1, x, y).
+            // Sums over neighbours: X^t Omega X, X^t Omega value, X^t Omega V Omega X with rows (1, x, y).
             let mut n = [V::zero(); 6];
             let mut b = [V::zero(); 3];
             let mut v = [V::zero(); 6];
@@ -101,13 +103,13 @@ impl Kernel<f64> for Regress<'_> {
                 let omega = kappa * V::load(&group[4]);
                 let noise = kappa * omega;
                 let products = [one, x, y, x * x, x * y, y * y];
-                let nu = V::load(&group[3]) * omega;
+                let value = V::load(&group[3]) * omega;
                 for i in 0..6 {
                     n[i] = omega.mul_add(products[i], n[i]);
                     v[i] = noise.mul_add(products[i], v[i]);
                 }
                 for i in 0..3 {
-                    b[i] = nu.mul_add(products[i], b[i]);
+                    b[i] = value.mul_add(products[i], b[i]);
                 }
             }
             let ridge = n[0] * V::constant(RIDGE);
@@ -132,11 +134,11 @@ impl Kernel<f64> for Regress<'_> {
     }
 }
 
-/// Predicts the depth of each of `queries` (places in the tree) from the `k` nearest of its neighbours,
+/// Predicts the value of each of `queries` (places in the tree) from the `k` nearest of its neighbours,
 /// itself left out.
 ///
-/// Weights `[(1 - (d / h)^3)^2 + 0.001] s^2` with the distance `h` of the `k`-th; `c = sum l_j^2 v_j` of the
-/// smoother's weights `l`.
+/// Weights `(1 - (d / h)^3)^2 + 0.001` times the precision, with the distance `h` of the `k`-th; `c = sum
+/// l_j^2 v_j` of the smoother's weights `l`.
 pub(crate) fn regress(
     sites: &[Site],
     queries: &[u32],
@@ -157,8 +159,8 @@ pub(crate) fn regress(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::kd_tree::Tree;
     use crate::math::random::CounterRng;
+    use crate::scattered::Tree;
     use nalgebra::{DMatrix, DVector};
 
     /// The same by matrices.
@@ -170,12 +172,12 @@ mod tests {
         let kappa = |j: &u32| (1.0 - (to(j).norm() / reach).powi(3)).powi(2) + 0.001;
         let omega = DMatrix::from_diagonal(&DVector::from_iterator(
             nearest.len(),
-            nearest.iter().map(|j| kappa(j) * sites[*j as usize].s2),
+            nearest.iter().map(|j| kappa(j) * sites[*j as usize].precision),
         ));
-        let nu = DVector::from_iterator(nearest.len(), nearest.iter().map(|&j| sites[j as usize].nu));
+        let value = DVector::from_iterator(nearest.len(), nearest.iter().map(|&j| sites[j as usize].value));
         let solve = (x.transpose() * &omega * &x).try_inverse().unwrap() * x.transpose() * omega;
-        let c = nearest.iter().enumerate().map(|(i, &j)| solve[(0, i)].powi(2) / sites[j as usize].s2).sum();
-        ((solve * nu)[0], c)
+        let c = nearest.iter().enumerate().map(|(i, &j)| solve[(0, i)].powi(2) / sites[j as usize].precision).sum();
+        ((solve * value)[0], c)
     }
 
     #[test]
@@ -189,8 +191,8 @@ mod tests {
             let tree = Tree::new(&(0..150).map(at).collect::<Vec<_>>());
             let site = |(i, &at): (usize, &[f64; 3])| Site {
                 at,
-                nu: rng.stream(1).normal(i as u64),
-                s2: 0.5 + rng.stream(2).uniform(i as u64),
+                value: rng.stream(1).normal(i as u64),
+                precision: 0.5 + rng.stream(2).uniform(i as u64),
             };
             let sites: Vec<Site> = tree.points().iter().enumerate().map(site).collect();
             let queries: Vec<u32> = (0..150).step_by(7).collect();

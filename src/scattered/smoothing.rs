@@ -1,16 +1,26 @@
-//! Which depths weigh the equations: predicted by what suits the scene best, then drawn to the prediction as
-//! far as that can be trusted.
+//! Noisy values drawn to what others predict, as far as that can be trusted (empirical Bayes).
 
-use super::refine::MANY;
 use super::regression::{Prediction, Site, regress};
-use crate::math::kd_tree::{Neighbours, SIZES, Tree};
+use super::tree::{Neighbours, SIZES, Tree};
 use crate::math::random::CounterRng;
-use crate::motion3d::kernels::Depths;
-use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::options::Smoother;
 use crate::simd::Level;
 
-/// Most that a point counts, in squared standard deviations: a step in depth must not decide alone.
+/// Which predictors may be used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Smoother {
+    /// The better of both on these points.
+    #[default]
+    Auto,
+    /// One normal distribution of all values.
+    Prior,
+    /// Local-linear regression on the 8, 16, 32 or 64 nearest points.
+    Neighbours,
+}
+
+/// Most points that predictors are compared on.
+const COMPARED: usize = 4000;
+
+/// Most that a point counts, in squared standard deviations: a step must not decide alone.
 const CAP: f64 = 25.0;
 
 /// Rounds of the excess variance of one prior.
@@ -26,18 +36,18 @@ struct Fitted {
     loss: f64,
 }
 
-/// Depths for the weights, how much of each point's own is in them, and their posterior variances; as long as
-/// the planes.
+/// Posterior means, how much of each point's own value is in them, and their variances; as many as the values
+/// given.
 #[derive(Debug, Clone)]
 pub(crate) struct Smoothed {
-    pub nu: Vec<f64>,
+    pub value: Vec<f64>,
     pub share: Vec<f64>,
     pub variance: Vec<f64>,
 }
 
-/// Smooths depths of one set of points; the neighbourhoods are found once.
+/// Smooths values at one set of places; the neighbourhoods are found once.
 #[derive(Debug)]
-pub(crate) struct DepthSmoother {
+pub(crate) struct SiteSmoother {
     tree: Tree,
     which: Smoother,
     spherical: bool,
@@ -49,29 +59,20 @@ pub(crate) struct DepthSmoother {
     everyone: Option<Neighbours>,
 }
 
-impl DepthSmoother {
-    /// For these points.
-    pub fn new(observations: &Observations, which: Smoother, rng: CounterRng) -> Self {
-        let tree = Tree::new(&observations.site);
-        let n = observations.n;
-        let compared = rng.sample(n, MANY);
-        let most = SIZES.into_iter().rfind(|&k| k < n);
+impl SiteSmoother {
+    /// For `(x, y, 0)` on a plane, or points of the unit sphere.
+    pub fn new(places: &[[f64; 3]], spherical: bool, which: Smoother, rng: CounterRng) -> Self {
+        let tree = Tree::new(places);
+        let compared = rng.sample(places.len(), COMPARED);
+        let most = SIZES.into_iter().rfind(|&k| k < places.len());
         let lists = most.map_or_else(Neighbours::default, |k| tree.nearest(&compared, k));
-        Self {
-            tree,
-            which,
-            spherical: observations.spherical,
-            level: observations.level,
-            compared,
-            lists,
-            everyone: None,
-        }
+        Self { tree, which, spherical, level: Level::detect(), compared, lists, everyone: None }
     }
 
-    /// Points with their depths, by place in the tree.
-    fn depth_sites(&self, depths: &Depths) -> Vec<Site> {
+    /// By place in the tree.
+    fn measured_sites(&self, (values, precisions): (&[f64], &[f64])) -> Vec<Site> {
         let places = self.tree.order().iter().zip(self.tree.points());
-        places.map(|(&i, &at)| Site { at, nu: depths.nu[i as usize], s2: depths.s2[i as usize] }).collect()
+        places.map(|(&i, &at)| Site { at, value: values[i as usize], precision: precisions[i as usize] }).collect()
     }
 
     /// The predictor with the least loss on the compared points, and these.
@@ -96,15 +97,15 @@ impl DepthSmoother {
         for _ in 0..PRIOR_ROUNDS {
             let (mut sum, mut total) = (0.0, 0.0);
             for site in sites {
-                let weight = site.s2 / (1.0 + excess * site.s2);
-                sum += weight * site.nu;
+                let weight = site.precision / (1.0 + excess * site.precision);
+                sum += weight * site.value;
                 total += weight;
             }
             mean = if total > 0.0 { sum / total } else { 0.0 };
             let (mut scatter, mut squares) = (0.0, 0.0);
-            for site in sites.iter().filter(|site| site.s2 > 0.0) {
-                let weight = site.s2 / (1.0 + excess * site.s2);
-                scatter += weight * weight * ((site.nu - mean) * (site.nu - mean) - 1.0 / site.s2);
+            for site in sites.iter().filter(|site| site.precision > 0.0) {
+                let weight = site.precision / (1.0 + excess * site.precision);
+                scatter += weight * weight * ((site.value - mean) * (site.value - mean) - 1.0 / site.precision);
                 squares += weight * weight;
             }
             let next = if squares > 0.0 { (scatter / squares).max(0.0) } else { 0.0 };
@@ -119,17 +120,17 @@ impl DepthSmoother {
         Fitted { nearest: None, prediction, excess, loss }
     }
 
-    /// How unlikely the depths are, given their neighbours, in units of `J`: `sum [ln(tot s^2) + min(res^2 /
-    /// tot, 25)]`. Always uses the better predictor.
-    pub fn cost(&self, depths: &Depths) -> f64 {
-        let sites = self.depth_sites(depths);
+    /// How unlikely values of these precisions are, given their neighbours: twice the negative logarithm of
+    /// the likelihood, `sum [ln(tot / v) + min(res^2 / tot, 25)]`. Always uses the better predictor.
+    pub fn cost(&self, measured: (&[f64], &[f64])) -> f64 {
+        let sites = self.measured_sites(measured);
         let (fitted, compared) = self.best(&sites, Smoother::Auto);
         loss(&compared, &fitted.prediction, fitted.excess, 1.0) * sites.len() as f64
     }
 
-    /// The posterior means `nu~ = q + (t2 + c) / tot (nu^ - q)` of all depths; as long as the planes.
-    pub fn smooth(&mut self, depths: &Depths) -> Smoothed {
-        let sites = self.depth_sites(depths);
+    /// The posterior means `q + (t2 + c) / tot (value - q)` of values of these precisions.
+    pub fn smooth(&mut self, measured: (&[f64], &[f64])) -> Smoothed {
+        let sites = self.measured_sites(measured);
         let (Fitted { nearest, prediction, excess, .. }, _) = self.best(&sites, self.which);
         let all = match nearest {
             None => {
@@ -146,28 +147,30 @@ impl DepthSmoother {
                 regress(&sites, &everyone, lists, k, self.spherical, self.level)
             }
         };
-        let none = vec![0.0; depths.nu.len()];
-        let mut out = Smoothed { nu: none.clone(), share: none.clone(), variance: none };
+        let none = vec![0.0; measured.0.len()];
+        let mut out = Smoothed { value: none.clone(), share: none.clone(), variance: none };
         for (place, (site, &i)) in sites.iter().zip(self.tree.order()).enumerate() {
-            // (t2 + c) / (t2 + c + 1 / s2), which is 0 at the epipole.
+            // (t2 + c) / (t2 + c + 1 / precision), which is 0 at the epipole.
             let (q, spread) = (all.q[place], excess + all.c[place]);
-            let wide = spread * site.s2;
+            let wide = spread * site.precision;
             let share = wide / (wide + 1.0);
             out.share[i as usize] = share;
             out.variance[i as usize] = spread / (wide + 1.0);
-            out.nu[i as usize] = q + share * (site.nu - q);
+            out.value[i as usize] = q + share * (site.value - q);
         }
         out
     }
 }
 
-/// The scatter of depths about their predictions beyond both noises, `t2`.
+/// The scatter of values about their predictions beyond both noises, `t2`.
 fn excess_variance(sites: &[Site], prediction: &Prediction) -> f64 {
     let (mut sum, mut total) = (0.0, 0.0);
-    for (site, (q, c)) in sites.iter().zip(prediction.q.iter().zip(&prediction.c)).filter(|(site, _)| site.s2 > 0.0) {
-        let noise = 1.0 / site.s2 + c;
+    for (site, (q, c)) in
+        sites.iter().zip(prediction.q.iter().zip(&prediction.c)).filter(|(site, _)| site.precision > 0.0)
+    {
+        let noise = 1.0 / site.precision + c;
         let weight = 1.0 / (noise * noise);
-        let square = (site.nu - q) * (site.nu - q);
+        let square = (site.value - q) * (site.value - q);
         sum += weight * (square.min(CAP * noise) - noise);
         total += weight;
     }
@@ -177,10 +180,12 @@ fn excess_variance(sites: &[Site], prediction: &Prediction) -> f64 {
 /// Mean of `ln tot + min(res^2 / tot, 25)`, `tot = t2 + v + c`; with `relative` 1, of `ln(tot s^2)`.
 fn loss(sites: &[Site], prediction: &Prediction, excess: f64, relative: f64) -> f64 {
     let (mut sum, mut count) = (0.0, 0usize);
-    for (site, (q, c)) in sites.iter().zip(prediction.q.iter().zip(&prediction.c)).filter(|(site, _)| site.s2 > 0.0) {
-        let total = excess + 1.0 / site.s2 + c;
-        let square = (site.nu - q) * (site.nu - q);
-        sum += total.ln() + relative * site.s2.ln() + (square / total).min(CAP);
+    for (site, (q, c)) in
+        sites.iter().zip(prediction.q.iter().zip(&prediction.c)).filter(|(site, _)| site.precision > 0.0)
+    {
+        let total = excess + 1.0 / site.precision + c;
+        let square = (site.value - q) * (site.value - q);
+        sum += total.ln() + relative * site.precision.ln() + (square / total).min(CAP);
         count += 1;
     }
     if count > 0 { sum / count as f64 } else { f64::INFINITY }
