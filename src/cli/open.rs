@@ -1,6 +1,6 @@
 //! From input arguments to a source, and what is known about it before the run.
 
-use super::arguments::{ComputeArguments, InputArguments};
+use super::{arguments::ComputeArguments, arguments::InputArguments};
 use crate::error::{Error, Result};
 use crate::flow::InitialFlow;
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};

@@ -1,6 +1,6 @@
 //! The list of scenes, for people and for programs.
 
-use super::report::{Report, print};
+use super::{report::Report, report::print};
 use crate::error::Result;
 use crate::synth::registry::{CARRIERS, Parameter, SCENES};
 use crate::synth::targets;

@@ -1,8 +1,6 @@
 //! Recordings of scenes of targets, for `jacoflow synth`: colour frames and the true boxes.
 
-use super::interrupt::Watch;
-use super::progress::Bar;
-use super::report::{Report, print_message};
+use super::{interrupt::Watch, progress::Bar, report::Report, report::print_message};
 use crate::error::{Error, Result};
 use crate::io::{MotTable, check_sink, open_colour_sink};
 use crate::parallel::{Progress, Threads};

@@ -1,7 +1,7 @@
 //! The extended filter: non-linear functions, linearised at the mean (A. H. Jazwinski, "Stochastic Processes
 //! and Filtering Theory", 1970, chapter 8).
 
-use super::state::{GaussianState, check_measurement, expect, finite, reach_state};
+use super::{state::GaussianState, state::check_measurement, state::expect, state::finite, state::reach_state};
 use crate::error::Result;
 
 /// A batch of extended Kalman filters: `x' = f(x) + w`, `z = h(x) + v`.

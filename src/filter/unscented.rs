@@ -3,7 +3,7 @@
 use super::sigma_points::SigmaPoints;
 use super::state::{GaussianState, check_measurement, expect, finite, reach_state, shared};
 use crate::error::{Error, Result};
-use crate::math::dense::{cholesky, solve, symmetrise};
+use crate::math::{dense::cholesky, dense::solve, dense::symmetrise};
 
 /// A batch of unscented Kalman filters: `x' = f(x) + w` (or `f(x, w)`), `z = h(x) + v`.
 ///

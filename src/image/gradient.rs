@@ -1,7 +1,6 @@
 //! Slopes of brightness: convolution with the derivatives of a Gaussian, by row bands.
 
-use super::Border;
-use super::blocks::{cover, load, store};
+use super::{Border, blocks::cover, blocks::load, blocks::store};
 use crate::parallel::BAND_ROWS;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::Frame;

@@ -1,7 +1,6 @@
 //! Frames and masks of half the size, for estimators that go from coarse to fine.
 
-use super::GaussianSmoother;
-use super::blocks::{cover, load, store};
+use super::{GaussianSmoother, blocks::cover, blocks::load, blocks::store};
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::{Frame, Mask};

@@ -1,7 +1,6 @@
 //! Gaussian smoothing: a symmetric separable convolution, vectorised along rows and parallel over row bands.
 
-use super::Border;
-use super::blocks::{cover, load, store};
+use super::{Border, blocks::cover, blocks::load, blocks::store};
 use crate::error::{Error, Result};
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch, same, same_mut};

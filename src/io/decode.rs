@@ -1,7 +1,6 @@
 //! Image files to grey or colour frames.
 
-use super::channels::{ChannelPolicy, Channels, StoredSample};
-use super::jpeg;
+use super::{channels::ChannelPolicy, channels::Channels, channels::StoredSample, jpeg};
 use crate::error::{Error, Result};
 use ::image::{DynamicImage, ImageError, ImageFormat, ImageReader};
 use std::fs::File;

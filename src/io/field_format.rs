@@ -1,7 +1,6 @@
 //! The formats a flow field can be written in: one variant and one arm each.
 
-use super::npy::Element;
-use super::{FloatMap, FlowImage, write_flo, write_kitti, write_npz, write_pfm};
+use super::{FloatMap, FlowImage, npy::Element, write_flo, write_kitti, write_npz, write_pfm};
 use crate::error::Result;
 use crate::math::Real;
 use crate::types::{FlowField, choices};

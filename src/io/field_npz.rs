@@ -11,8 +11,7 @@
 //! | `points` | (N, 2) int64 | pixels (x, y) of the sites, if they are points (then H = 1, W = N) |
 //! | `metadata` | text | JSON: model, parameters, units, sites, frame, library version, options |
 
-use super::npy::Element;
-use super::npz::{NpzReader, NpzWriter};
+use super::{npy::Element, npz::NpzReader, npz::NpzWriter};
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FieldLayout, FlowField, Rect, SamplingGrid, Status};

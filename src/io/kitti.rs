@@ -2,9 +2,7 @@
 //!
 //! 16-bit RGB: `u = (R - 32768) / 64`, `v = (G - 32768) / 64`, valid where `B > 0`; px.
 
-use super::FlowImage;
-use super::decode::{check_size, png_error};
-use super::write::atomic;
+use super::{FlowImage, decode::check_size, decode::png_error, write::atomic};
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::BufReader;

@@ -7,7 +7,7 @@
 //! Source: A. Milan, L. Leal-Taixe, I. Reid, S. Roth, K. Schindler, "MOT16: A Benchmark for Multi-Object
 //! Tracking", 2016.
 
-use super::table::{TableWriter, table_endings};
+use super::{table::TableWriter, table::table_endings};
 use crate::error::{Error, Result};
 use crate::types::{TargetBox, TrackState, TrackStatus};
 use std::path::Path;

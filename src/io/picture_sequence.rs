@@ -1,7 +1,6 @@
 //! Pictures as a sequence: colour YUV4MPEG2, which players and encoders read.
 
-use super::sink::{eight_bit_planes, ratio};
-use super::write::AtomicFile;
+use super::{sink::eight_bit_planes, sink::ratio, write::AtomicFile};
 use crate::error::{Error, Result};
 use crate::image::picture::Picture;
 use std::io::Write;

@@ -1,6 +1,6 @@
 //! Tracks as CSV: one row a target and frame.
 
-use super::table::{TableWriter, cell, table_endings};
+use super::{table::TableWriter, table::cell, table::table_endings};
 use crate::error::Result;
 use crate::types::TrackState;
 use std::path::Path;

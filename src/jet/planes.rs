@@ -1,7 +1,6 @@
 //! Jets of every pixel.
 
-use super::rows::JetRows;
-use super::stencil::JetStencil;
+use super::{rows::JetRows, stencil::JetStencil};
 use crate::math::Real;
 use crate::parallel::{BAND_ROWS, Threads};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch, same, same_mut};

@@ -1,6 +1,6 @@
 //! Jets of one image row at a time, in lanes: the parts that dense estimators are made of.
 
-use super::stencil::{JetStencil, Reach};
+use super::{stencil::JetStencil, stencil::Reach};
 use crate::simd::{Lanes, SimdReal};
 
 /// Starts of the vectors that cover `range`: the last one is moved back to end with the range.

@@ -5,7 +5,7 @@
 //! orthogonal over the rectangle, so each coefficient of the fit is one separable filter, and the jet at the
 //! site follows from the six coefficients.
 
-use super::neighbourhood::{side_offsets, weight};
+use super::{neighbourhood::side_offsets, neighbourhood::weight};
 
 /// The filters of one axis.
 #[derive(Debug, Clone)]

@@ -1,7 +1,6 @@
 //! The stencil of a neighbourhood: weights, covariance, and the jet at one pixel.
 
-use super::neighbourhood::{Neighbourhood, weight};
-use super::separable::{Axis, taylor};
+use super::{neighbourhood::Neighbourhood, neighbourhood::weight, separable::Axis, separable::taylor};
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::Frame;

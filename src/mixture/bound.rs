@@ -1,8 +1,6 @@
 //! The lower bound of the evidence, which every round raises.
 
-use super::densities::Factors;
-use super::posterior::Posterior;
-use super::prior::Prior;
+use super::{densities::Factors, posterior::Posterior, prior::Prior};
 use crate::error::Result;
 use crate::math::special::ln_gamma;
 use std::f64::consts::{LN_2, PI, TAU};

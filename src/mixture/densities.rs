@@ -1,6 +1,6 @@
 //! The densities that the E step evaluates.
 
-use super::points::{BAND, Points};
+use super::{points::BAND, points::Points};
 use crate::error::{Error, Result};
 use crate::math::dense;
 use rayon::prelude::*;

@@ -1,7 +1,6 @@
 //! What is believed before any point is seen.
 
-use super::options::{CovariancePrior, MixtureOptions};
-use super::points::{LARGEST, Points};
+use super::{options::CovariancePrior, options::MixtureOptions, points::LARGEST, points::Points};
 use crate::error::{Error, Result};
 use crate::math::dense;
 

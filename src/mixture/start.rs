@@ -1,8 +1,6 @@
 //! What the first M step is made from: labels or responsibilities.
 
-use super::expectation::Expected;
-use super::moments::Moments;
-use super::points::Points;
+use super::{expectation::Expected, moments::Moments, points::Points};
 use crate::error::{Error, Result};
 
 /// How far from 1 the responsibilities of a point may sum up.

@@ -1,7 +1,7 @@
 //! Where drawn pictures go: numbered files in a folder, or a sequence.
 
 use crate::error::{Error, Result};
-use crate::image::picture::{Picture, grey_picture};
+use crate::image::{picture::Picture, picture::grey_picture};
 use crate::io::write::TemporaryFolder;
 use crate::io::{NumberedFiles, SequenceWriter, write_frame_png, write_picture};
 use crate::pipeline::output::{check_target, is_folder};

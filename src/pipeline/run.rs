@@ -1,8 +1,6 @@
 //! The loop over frames.
 
-use super::prefetch::Prefetch;
-use super::sink::{FieldSink, Step, end_all, in_place};
-use super::stage::Stage;
+use super::{prefetch::Prefetch, sink::FieldSink, sink::Step, sink::end_all, sink::in_place, stage::Stage};
 use crate::error::{Error, Result};
 use crate::io::FrameSource;
 use crate::parallel::Progress;

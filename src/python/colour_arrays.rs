@@ -1,6 +1,6 @@
 //! Colour frames (H, W, 3) out of numpy arrays, and back.
 
-use super::arrays::{as_array, dtype_name, elements, owned, wrong_dtype};
+use super::{arrays::as_array, arrays::dtype_name, arrays::elements, arrays::owned, arrays::wrong_dtype};
 use crate::types::{AnyColourFrame, ColourFrame, Frame};
 use numpy::{Element, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;

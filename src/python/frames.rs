@@ -1,8 +1,7 @@
 //! `jacoflow.io`: frames in and out, grey or in colour.
 
 use super::arrays::{self, ColourRule};
-use super::colour_arrays::{colour_frame, from_any_colour_frame};
-use super::options;
+use super::{colour_arrays::colour_frame, colour_arrays::from_any_colour_frame, options};
 use crate::error::Error;
 use crate::io::{
     Colour, ColourSource, FrameSink, FrameSource, Grey, OpenOptions, open, open_colour, open_colour_sink, open_sink,

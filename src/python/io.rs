@@ -1,7 +1,6 @@
 //! `jacoflow.io`: flow and float maps in and out.
 
-use super::arrays;
-use super::field::{FlowField, Store};
+use super::{arrays, field::FlowField, field::Store};
 use crate::error::Error;
 use crate::io::{
     FieldFormat, FloatMap, FlowImage, NumberedFiles, npz::NpzReader, read_flo, read_kitti, read_npz_from, read_pfm,

@@ -1,8 +1,7 @@
 //! `jacoflow.scenes`: moving pictures with exact truth.
 
 use super::arrays::{self, ColourRule};
-use super::field::FlowField;
-use super::options::Integer;
+use super::{field::FlowField, options::Integer};
 use crate::error::Error;
 use crate::parallel::Threads;
 use crate::python::keywords::getters;

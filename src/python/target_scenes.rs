@@ -1,7 +1,6 @@
 //! `jacoflow.scenes.TargetScene`: colour scenes of targets that look alike, with exact boxes.
 
-use super::arrays;
-use super::options::Integer;
+use super::{arrays, options::Integer};
 use crate::error::Error;
 use crate::parallel::Threads;
 use crate::python::keywords::getters;

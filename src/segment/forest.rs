@@ -1,6 +1,6 @@
 //! The regions as a forest of pixels, merged edge by edge.
 
-use super::edges::{Edge, EdgeWeight, second_offsets};
+use super::{edges::Edge, edges::EdgeWeight, edges::second_offsets};
 
 /// Disjoint regions of pixels; each region is a tree, its root carries the region's size and threshold.
 #[derive(Debug)]

@@ -1,6 +1,6 @@
 //! Stable sorting of edges by weight: least significant digit first.
 
-use super::edges::{Edge, EdgeKey};
+use super::{edges::Edge, edges::EdgeKey};
 
 /// Bits of a digit: the counters of 2^11 digits stay in the first-level cache.
 const DIGIT_BITS: u32 = 11;

@@ -1,8 +1,8 @@
 //! The vector traits of the scalars themselves: one lane.
 
-use super::lanes::{Lanes, SimdReal};
 #[cfg(target_arch = "x86_64")]
 use super::x86::{F32x8, F32x16, F64x4, F64x8};
+use super::{lanes::Lanes, lanes::SimdReal};
 
 macro_rules! scalar_lanes {
     ($t:ty, $bits:ty, $bias:literal, $mantissa:literal) => {

@@ -6,8 +6,7 @@
 //! below, carry four directions each. Only the last rows of `L_r` are kept: they stay in the processor's
 //! caches.
 
-use super::cost::{CHUNK, UNIT};
-use super::edges::EdgeMap;
+use super::{cost::CHUNK, cost::UNIT, edges::EdgeMap};
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 
 /// Largest distance of the edge pixel behind, px.

@@ -3,8 +3,7 @@
 //! Few of the candidates of an edge pixel show its own class at their middle, about one in twenty. Only these
 //! have their window compared, 32 pixels of a row at a time.
 
-use super::edges::{EdgeMap, NO_CLASS};
-use super::options::EdgeDisparityOptions;
+use super::{edges::EdgeMap, edges::NO_CLASS, options::EdgeDisparityOptions};
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
 use rayon::prelude::*;

@@ -5,7 +5,7 @@
 //! weights sum to 0. `A` at whole pixels says all there is about the right view: between them it is
 //! interpolated just as the view would be, by cubic convolution, and steps cost next to nothing.
 
-use super::semi_global::{Match, View};
+use super::{semi_global::Match, semi_global::View};
 use crate::image::{Border, GaussianSmoother, Interpolation};
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;

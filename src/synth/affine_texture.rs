@@ -1,8 +1,6 @@
 //! Band-limited noise under a steady affine motion: the scene on which affine estimators are measured.
 
-use super::carried::Carried;
-use super::motion::AffineField;
-use super::texture::Noise;
+use super::{carried::Carried, motion::AffineField, texture::Noise};
 use crate::error::Result;
 
 /// Gaussian-filtered noise moving by `u(p) = (u, v) + M (p - c)`, the same at every time.

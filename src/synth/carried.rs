@@ -1,9 +1,6 @@
 //! Any texture carried by any motion.
 
-use super::Scene;
-use super::motion::Motion;
-use super::scene::render;
-use super::texture::Texture;
+use super::{Scene, motion::Motion, scene::render, texture::Texture};
 use crate::types::{AffineFlow, Frame};
 
 /// `I(p, t) = texture(phi(p))`, where `phi` follows the particle path through `p` at time `t` back to time 0.

@@ -1,8 +1,6 @@
 //! Particle images, as particle image velocimetry takes them.
 
-use super::Scene;
-use super::motion::Motion;
-use super::texture::{cell_index, poisson_of_mean_one};
+use super::{Scene, motion::Motion, texture::cell_index, texture::poisson_of_mean_one};
 use crate::error::{Error, Result};
 use crate::math::random::CounterRng;
 use crate::parallel::for_each_band;

@@ -5,9 +5,7 @@
 //! 78)` (lower triangles, row by row), `noise_scale` `(filters, 1)` and, where there is one, `mask` `(height,
 //! width)`. numpy can read it.
 
-use super::flow_filter::FlowFilter;
-use super::kernel::{N, PACKED, SCALE};
-use super::options::FlowFilterOptions;
+use super::{flow_filter::FlowFilter, kernel::N, kernel::PACKED, kernel::SCALE, options::FlowFilterOptions};
 use crate::error::{Error, Result};
 use crate::io::Element;
 use crate::io::npz::{NpzReader, NpzWriter};

@@ -1,7 +1,6 @@
 //! Which flow filter, and its constants.
 
-use super::method::{rectangle, word};
-use super::{parse_pair, parse_positive, parse_size};
+use super::{method::rectangle, method::word, parse_pair, parse_positive, parse_size};
 use crate::error::Result;
 use crate::temporal::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
 use clap::Args;

@@ -1,7 +1,6 @@
 //! How the stereo tracker works, and what it draws.
 
-use super::track::numbers;
-use super::{LayoutArguments, SearchArguments};
+use super::{LayoutArguments, SearchArguments, track::numbers};
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
 use crate::pipeline::{Numbering, PairTimes};

@@ -1,7 +1,6 @@
 //! Targets followed by the gradient tracker.
 
-use super::TrackCommand;
-use super::output::{TrackOutputArguments, Wanted};
+use super::{TrackCommand, output::TrackOutputArguments, output::Wanted};
 use crate::cli::interrupt::Watch;
 use crate::cli::open::{Opened, open_input, preprocess};
 use crate::cli::progress::Bar;

@@ -1,11 +1,7 @@
 //! Targets followed by particle filters, in colour.
 
-use super::TrackCommand;
-use super::output::{TrackOutputArguments, Wanted};
-use crate::cli::interrupt::Watch;
-use crate::cli::open::open_colour_input;
-use crate::cli::progress::Bar;
-use crate::cli::report::Report;
+use super::{TrackCommand, output::TrackOutputArguments, output::Wanted};
+use crate::cli::{interrupt::Watch, open::open_colour_input, progress::Bar, report::Report};
 use crate::error::{Error, Result};
 use crate::image::picture::TrackOverlay;
 use crate::parallel::Threads;

@@ -1,8 +1,7 @@
 //! How a run that followed given targets went.
 
-use super::TrackCommand;
-use super::output::files_in_words;
-use crate::cli::report::{Report, print_message};
+use super::{TrackCommand, output::files_in_words};
+use crate::cli::{report::Report, report::print_message};
 use crate::error::Error;
 use crate::pipeline::{TargetSummary, TrackSummary, is_folder};
 use crate::types::TrackStatus;

@@ -1,7 +1,6 @@
 //! Everything that moves before two cameras, followed by the stereo tracker.
 
-use super::TrackCommand;
-use super::output::{TrackOutputArguments, Wanted, files_in_words};
+use super::{TrackCommand, output::TrackOutputArguments, output::Wanted, output::files_in_words};
 use crate::cli::interrupt::Watch;
 use crate::cli::open::preprocess;
 use crate::cli::progress::Bar;

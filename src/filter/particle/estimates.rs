@@ -1,7 +1,6 @@
 //! Estimates from the weighted particles of each set.
 
-use super::state::ParticleFilter;
-use super::weights::effective_sample_size_of_logs;
+use super::{state::ParticleFilter, weights::effective_sample_size_of_logs};
 use crate::error::{Error, Result};
 
 impl ParticleFilter {

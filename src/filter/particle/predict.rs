@@ -1,7 +1,6 @@
 //! Prediction: every particle moves by the transition and its noise.
 
-use super::noise::roots;
-use super::state::{ParticleFilter, Purpose};
+use super::{noise::roots, state::ParticleFilter, state::Purpose};
 use crate::error::{Error, Result};
 use crate::filter::state::{check_covariances, check_matrix, expect, finite, shared};
 use crate::math::dense::multiply_transposed;

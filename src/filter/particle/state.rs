@@ -1,11 +1,9 @@
 //! A batch of weighted particle sets.
 
-use super::noise::roots;
-use super::weights::normalise_log_weights;
+use super::{noise::roots, weights::normalise_log_weights};
 use crate::error::{Error, Result};
 use crate::filter::state::{check_covariances, check_dimension, check_mean, expect, shared};
-use crate::math::dense::multiply_transposed;
-use crate::math::random::CounterRng;
+use crate::math::{dense::multiply_transposed, random::CounterRng};
 use crate::parallel::{Threads, for_each_band_of};
 use std::ops::Range;
 

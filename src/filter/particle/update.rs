@@ -1,7 +1,6 @@
 //! Update: weights are multiplied by the likelihood of the measurement.
 
-use super::state::ParticleFilter;
-use super::weights::normalise_log_weights;
+use super::{state::ParticleFilter, weights::normalise_log_weights};
 use crate::error::{Error, Result};
 
 impl ParticleFilter {

@@ -4,7 +4,7 @@
 //! system, solved by conjugate gradients with the inverse of each pixel's 2x2 block as preconditioner. Sums
 //! run over fixed bands in a fixed order, so the result does not depend on the number of threads.
 
-use super::pair::{Crop, Differences, Gradients, magnitude};
+use super::{pair::Crop, pair::Differences, pair::Gradients, pair::magnitude};
 use crate::error::{Error, Result};
 use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{MaskCounts, bands};

@@ -5,7 +5,7 @@
 //! than a tenth of the window's weight around it (in frames smaller than the window). Masked and bad pixels,
 //! in contrast, take every window with them that touches them.
 
-use super::pair::{Crop, Differences, Gradients, magnitude};
+use super::{pair::Crop, pair::Differences, pair::Gradients, pair::magnitude};
 use crate::error::{Error, Result};
 use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{FieldBand, MaskCounts, bands};

@@ -9,9 +9,7 @@
 //! Before any motion is known, whole frames are compared ([`equalize_roughly`]): enough for the coarse
 //! levels, on whose motion the change is then measured.
 
-use super::brightness_scale::BrightnessScale;
-use super::data_term::View;
-use super::planes::{Planes, SITE_SPACING};
+use super::{brightness_scale::BrightnessScale, data_term::View, planes::Planes, planes::SITE_SPACING};
 use crate::ablation::keeps;
 use crate::math::robust_std;
 use crate::simd::{Level, SimdReal};

@@ -1,7 +1,6 @@
 //! Planes extended beyond the frame, so that windows need no special case at its edge.
 
-use crate::flow::coarse_to_fine::plane_pool::PlanePool;
-use crate::flow::coarse_to_fine::planes::{CHUNK, LEFT, Planes};
+use crate::flow::coarse_to_fine::{plane_pool::PlanePool, planes::CHUNK, planes::LEFT, planes::Planes};
 use crate::simd::SimdReal;
 use std::ops::Range;
 

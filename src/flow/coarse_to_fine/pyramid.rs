@@ -1,8 +1,6 @@
 //! Frames on every level of the pyramid, ready to be warped.
 
-use super::brightness_scale::BrightnessScale;
-use super::data_term::View;
-use super::options::MIN_LEVEL_SIDE;
+use super::{brightness_scale::BrightnessScale, data_term::View, options::MIN_LEVEL_SIDE};
 use crate::image::{Spline, fill_holes, halve_into, halve_mask};
 use crate::simd::{Level, SimdReal};
 use crate::types::{Frame, Mask};

@@ -1,7 +1,6 @@
 //! How much work each level gets: iterations, sweeps and tolerances of a preset.
 
-use super::options::Preset;
-use super::regularize::Smoothness;
+use super::{options::Preset, regularize::Smoothness};
 
 /// Iterations, sweeps and tolerances of all levels. One iteration is a linearisation and its regularisation.
 #[derive(Debug, Clone, Copy, PartialEq)]

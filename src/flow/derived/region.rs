@@ -1,7 +1,6 @@
 //! Derived quantities over a field, and their mean over a region.
 
-use super::sharing::{in_common, sharing_among};
-use super::{Quantity, value_and_std};
+use super::{Quantity, sharing::in_common, sharing::sharing_among, value_and_std};
 use crate::error::{Error, Result};
 use crate::math::{MAD_TO_STD, Real, central_median};
 use crate::types::{FlowField, Rect, SamplingGrid};

@@ -1,7 +1,6 @@
 //! One affine motion for a whole region, from the estimates of its sites.
 
-use super::sharing;
-use super::sharing::in_common;
+use super::{sharing, sharing::in_common};
 use crate::math::Real;
 use crate::types::{FlowField, Rect, SamplingGrid};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector6};

@@ -1,7 +1,6 @@
 //! Working memory of a thread that walks rows.
 
-use super::dense::{Source, scratch_len};
-use super::detail::{BLOCK_LEN, RATES};
+use super::{dense::Source, dense::scratch_len, detail::BLOCK_LEN, detail::RATES};
 use crate::simd::SimdReal;
 use std::ops::Range;
 

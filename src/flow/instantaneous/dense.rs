@@ -1,7 +1,6 @@
 //! The affine model over rows of pixels, in lanes.
 
-use super::detail::RatesRow;
-use super::normal::{LaneRates, noise_square, solve_affine};
+use super::{detail::RatesRow, normal::LaneRates, normal::noise_square, normal::solve_affine};
 use crate::jet::{JetRows, TimeScheme, starts};
 use crate::simd::{Kernel, Lanes, SimdReal};
 use crate::types::Frame;

@@ -28,9 +28,7 @@ mod point;
 mod propagation;
 mod uncertainty;
 
-use super::model::ModelKind;
-use super::options::{EstimatorOptions, RankPolicy};
-use super::site::bands;
+use super::{model::ModelKind, options::EstimatorOptions, options::RankPolicy, site::bands};
 use crate::error::Result;
 use crate::jet::{JetRows, JetStencil, Neighbourhood, TimeScheme};
 use crate::simd::SimdReal;

@@ -5,7 +5,7 @@
 //! is made of fifteen products. It is solved by block elimination, pair by pair: three divisions, and short
 //! chains between them.
 
-use super::blocks::{Mat, Sym};
+use super::{blocks::Mat, blocks::Sym};
 use crate::math::Real;
 use crate::simd::{Lanes, SimdReal};
 

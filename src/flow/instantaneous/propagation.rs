@@ -9,8 +9,7 @@
 //! `C = R S R^T` (R unit upper triangular, S diagonal) turn the covariance into a sum of squares, which
 //! rounding cannot make indefinite: three combinations of X0, X1, X2 times R times the root of S.
 
-use super::lane_noise::LaneNoise;
-use super::normal::{LaneRates, Normal};
+use super::{lane_noise::LaneNoise, normal::LaneRates, normal::Normal};
 use crate::simd::{Lanes, SimdReal};
 
 /// Columns of the factored covariance: three combinations of six components.

@@ -1,9 +1,6 @@
 //! Many points, forward and back.
 
-use super::follow::follow;
-use super::options::PointFlowOptions;
-use super::pyramid::PointPyramid;
-use super::window::Window;
+use super::{follow::follow, options::PointFlowOptions, pyramid::PointPyramid, window::Window};
 use crate::error::{Error, Result};
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;

@@ -1,7 +1,6 @@
 //! One point followed from one pyramid into another.
 
-use super::options::PointFlowOptions;
-use super::window::Window;
+use super::{options::PointFlowOptions, window::Window};
 use crate::simd::Lanes;
 use crate::types::Frame;
 

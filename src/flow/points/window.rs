@@ -1,7 +1,7 @@
 //! The sums over one window: its structure tensor, and the step that explains the difference from the other
 //! frame.
 
-use super::rows::{Block, Rows};
+use super::{rows::Block, rows::Rows};
 use crate::image::StructureTensor;
 use crate::simd::Lanes;
 use crate::types::Frame;

@@ -3,7 +3,7 @@
 //! `P = -J` is linear in the jet. Unknowns are scaled to `(u, v, s u_x, s v_x, s u_y, s v_y)`, s the window's
 //! sigma, so that all columns are of one order.
 
-use super::plan::{MAX_PLANES, Plan};
+use super::{plan::MAX_PLANES, plan::Plan};
 use crate::simd::Lanes;
 
 /// Rows in which the columns of the flow, of its derivatives along x and along y are not zero.

@@ -4,8 +4,7 @@
 //! `w y^2`, with `w = g(x) g(y)`: three one-dimensional filters down the columns, and along the rows those of
 //! each result that are still needed.
 
-use super::plan::{Plan, moments};
-use super::tile::{GROUP_ROWS, Planes, TILE_COLUMNS};
+use super::{plan::Plan, plan::moments, tile::GROUP_ROWS, tile::Planes, tile::TILE_COLUMNS};
 use crate::flow::moment_filter::{filter, weights};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 

@@ -1,9 +1,7 @@
 //! How white pixel noise enters the equations: through the right-hand side `-i'`, `-i''` and, times m,
 //! through the coefficients `P(i)`, `P(i')`.
 
-use super::combine::Combination;
-use super::equations::columns;
-use super::options::WindowedOptions;
+use super::{combine::Combination, equations::columns, options::WindowedOptions};
 use crate::flow::moment_filter::weights;
 use crate::jet::JetStencil;
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};

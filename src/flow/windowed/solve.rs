@@ -1,7 +1,6 @@
 //! The normal equations of a window from its moments, one lane a pixel.
 
-use super::moments::Moments;
-use super::plan::Plan;
+use super::{moments::Moments, plan::Plan};
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::{Lanes, SimdReal};
 

@@ -1,9 +1,6 @@
 //! From frames to planes of products, one tile at a time, small enough for the processor's caches.
 
-use super::combine::Combination;
-use super::equations::{Jets, products};
-use super::plan::Plan;
-use super::support::Support;
+use super::{combine::Combination, equations::Jets, equations::products, plan::Plan, support::Support};
 use crate::flow::moment_filter::CHUNK;
 use crate::jet::{JetRows, Reach};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};

@@ -1,7 +1,7 @@
 //! The corner score of every pixel, vectorised along rows and parallel over row bands.
 
 use crate::error::{Error, Result};
-use crate::image::blocks::{cover, load, store};
+use crate::image::{blocks::cover, blocks::load, blocks::store};
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;

@@ -1,9 +1,6 @@
 //! A graph over time: steps to the right, a lane for each component.
 
-use super::clusters::identity_colour;
-use super::digits::draw_number;
-use super::line::draw_stroke;
-use super::{Picture, Rgb};
+use super::{Picture, Rgb, clusters::identity_colour, digits::draw_number, line::draw_stroke};
 
 /// Distance of steps where there is room, and of lanes, px.
 const PITCH: [f64; 2] = [36.0, 28.0];

@@ -1,7 +1,6 @@
 //! What comes near, over a frame: points coloured by rate of approach, and the focus of expansion.
 
-use super::diverging::{SignedMap, symmetric_range};
-use super::{Picture, Rgb};
+use super::{Picture, Rgb, diverging::SignedMap, diverging::symmetric_range};
 
 /// A point and how fast it comes nearer.
 #[derive(Debug, Clone, Copy, PartialEq)]

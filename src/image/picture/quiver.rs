@@ -1,7 +1,6 @@
 //! Flow as arrows over a picture.
 
-use super::line::draw_stroke;
-use super::{Picture, Rgb, check_plane, percentile};
+use super::{Picture, Rgb, check_plane, line::draw_stroke, percentile};
 use crate::error::{Error, Result};
 use crate::math::Real;
 

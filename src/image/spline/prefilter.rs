@@ -9,7 +9,7 @@
 //!   + z q)(1 + z^2 q^2)(1 + z^4 q^4)...`, each factor together with its mirror image a filter of three taps.
 
 use super::{BEFORE, MARGIN};
-use crate::image::blocks::{BLOCK, cover, load, store};
+use crate::image::{blocks::BLOCK, blocks::cover, blocks::load, blocks::store};
 use crate::parallel::{BAND_ROWS, for_each_band_of};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::Frame;

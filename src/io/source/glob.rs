@@ -1,7 +1,6 @@
 //! Image files that match a pattern.
 
-use super::files::{is_pattern, sort_naturally};
-use super::{FilesSource, Kind, has_extension};
+use super::{FilesSource, Kind, files::is_pattern, files::sort_naturally, has_extension};
 use crate::error::{Error, Result};
 use crate::io::decode::EXTENSIONS;
 use std::path::PathBuf;

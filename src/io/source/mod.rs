@@ -18,7 +18,7 @@ pub use select::Selected;
 pub use views::{ViewLayout, ViewPairs};
 pub use y4m::Y4mSource;
 
-use super::channels::{Colour, Grey};
+use super::{channels::Colour, channels::Grey};
 use crate::error::{Error, Result};
 use crate::types::{AnyColourFrame, AnyFrame};
 use std::path::Path;

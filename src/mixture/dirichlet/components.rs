@@ -1,7 +1,6 @@
 //! The M step: Gaussians with proportions from the moments of the points.
 
-use super::options::{DirichletOptions, Inference, add_to_diagonal};
-use super::sticks;
+use super::{options::DirichletOptions, options::Inference, options::add_to_diagonal, sticks};
 use crate::error::Result;
 use crate::math::special::digamma;
 use crate::mixture::densities::{Densities, Factors};

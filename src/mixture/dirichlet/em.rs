@@ -1,8 +1,6 @@
 //! Rounds of M and E steps.
 
-use super::components::Components;
-use super::options::DirichletOptions;
-use super::score::Scorer;
+use super::{components::Components, options::DirichletOptions, score::Scorer};
 use crate::error::Result;
 use crate::mixture::densities::Densities;
 use crate::mixture::expectation::{Expected, expect};

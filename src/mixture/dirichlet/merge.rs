@@ -4,7 +4,7 @@
 //! of N. Ueda, R. Nakano, Z. Ghahramani and G. Hinton, "SMEM algorithm for mixture models" (2000), with F as
 //! the judge.
 
-use super::em::{Problem, Run};
+use super::{em::Problem, em::Run};
 use crate::error::Result;
 use crate::mixture::moments::Moments;
 

@@ -4,7 +4,7 @@
 //! decreasing weight; `T_k = sum_(j>k) N_j` is the weight behind component k.
 
 use super::options::Inference;
-use crate::math::special::{digamma, ln_gamma};
+use crate::math::{special::digamma, special::ln_gamma};
 
 /// `T_k` (K). Summed from the last: behind the last component with points it is 0 exactly.
 fn behind(counts: &[f64]) -> Vec<f64> {

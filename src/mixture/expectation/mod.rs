@@ -3,9 +3,7 @@
 mod any;
 mod fixed;
 
-use super::densities::Densities;
-use super::moments::Moments;
-use super::points::{BAND, BLOCK, Planes};
+use super::{densities::Densities, moments::Moments, points::BAND, points::BLOCK, points::Planes};
 use crate::simd::{Lanes, Level, dispatch, exp};
 use any::AnyBand;
 use fixed::Band;

@@ -2,7 +2,7 @@
 
 use super::ParticleFrame;
 use crate::error::Result;
-use crate::image::picture::{GreyRange, TrackColours};
+use crate::image::{picture::GreyRange, picture::TrackColours};
 use crate::pipeline::album::Album;
 use crate::pipeline::sink::{Ending, Sink};
 use crate::pipeline::track::Overlays;

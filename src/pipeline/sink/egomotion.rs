@@ -1,9 +1,8 @@
 //! The camera's motion from every field, one row each, and pictures of what comes near.
 
-use super::table::{Table, TableTarget};
-use super::{Ending, Sink, Step};
+use super::{Ending, Sink, Step, table::Table, table::TableTarget};
 use crate::error::Result;
-use crate::image::picture::{ContactMark, draw_contacts, grey_picture};
+use crate::image::{picture::ContactMark, picture::draw_contacts, picture::grey_picture};
 use crate::io::npz::NpzWriter;
 use crate::io::{NumberedFiles, cell, write_picture};
 use crate::math::Real;

@@ -1,7 +1,6 @@
 //! Derived quantities of a region or of points, one row each and frame.
 
-use super::table::{Table, TableTarget};
-use super::{Ending, Sink, Step};
+use super::{Ending, Sink, Step, table::Table, table::TableTarget};
 use crate::error::{Error, Result};
 use crate::flow::derived::{Quantity, fit_region, value_and_std};
 use crate::io::cell;

@@ -15,7 +15,7 @@ pub use pictures::{PictureRanges, Pictures};
 pub(in crate::pipeline) use table::end_table;
 pub use table::{Rows, Table, TableTarget};
 
-use super::output::{OutputPlan, Place, check_writable};
+use super::{output::OutputPlan, output::Place, output::check_writable};
 use crate::error::{Error, Result};
 use crate::io::Element;
 use crate::math::Real;

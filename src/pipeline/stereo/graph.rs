@@ -2,7 +2,7 @@
 
 use super::{StereoSink, StereoStep};
 use crate::error::{Error, Result};
-use crate::image::picture::{ChartArc, ChartNode, chart_picture};
+use crate::image::{picture::ChartArc, picture::ChartNode, picture::chart_picture};
 use crate::io::write::atomic;
 use crate::io::write_picture;
 use crate::pipeline::sink::{Ending, TableTarget, end_table};

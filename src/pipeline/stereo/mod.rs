@@ -12,8 +12,7 @@ pub use pairs::{GreyPair, GreyPairs};
 pub use rows::{ClusterRows, StereoFormat};
 pub use times::PairTimes;
 
-use super::run::Numbering;
-use super::sink::{Ending, end_all, in_place};
+use super::{run::Numbering, sink::Ending, sink::end_all, sink::in_place};
 use crate::error::{Error, Result};
 use crate::parallel::Progress;
 use crate::track::StereoTracker;

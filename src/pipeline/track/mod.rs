@@ -7,9 +7,7 @@ pub use overlay::{Overlays, PATH_LENGTH};
 pub(super) use rows::{Row, RowWriter};
 pub use rows::{TrackFormat, TrackRows};
 
-use super::prefetch::Prefetch;
-use super::run::{Numbering, check_size};
-use super::sink::{Sink, end_all};
+use super::{prefetch::Prefetch, run::Numbering, run::check_size, sink::Sink, sink::end_all};
 use crate::error::{Error, Result};
 use crate::image::Preprocess;
 use crate::io::FrameSource;

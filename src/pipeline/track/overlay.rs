@@ -2,7 +2,7 @@
 
 use super::TrackStep;
 use crate::error::Result;
-use crate::image::picture::{GreyRange, PathPoint, Picture, TrackOverlay};
+use crate::image::{picture::GreyRange, picture::PathPoint, picture::Picture, picture::TrackOverlay};
 use crate::pipeline::album::Album;
 use crate::pipeline::sink::{Ending, Sink};
 use crate::types::TrackState;

@@ -1,11 +1,8 @@
 //! The options of `estimate` and `FlowEstimator`, and the core's options that they mean.
 
 use crate::flow::{Estimator, EstimatorOptions, InitialFlow, METHODS, Method, MethodInfo, MethodSettings, PAIR};
-use crate::python::arrays;
-use crate::python::image::renamed;
-use crate::python::io::flow_image;
-use crate::python::keywords::{keep_options, with_common};
 use crate::python::options::{self, Group, Integer, Object, PreprocessOptions};
+use crate::python::{arrays, image::renamed, io::flow_image, keywords::keep_options, keywords::with_common};
 use crate::temporal::{AnyFlowStream, RecursiveOptions, StreamPlan};
 use pyo3::prelude::*;
 use std::sync::Arc;

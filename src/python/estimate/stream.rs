@@ -1,12 +1,10 @@
 //! `FlowEstimator`: flow from frames that come one by one.
 
-use super::arguments::{Arguments, estimator_options};
+use super::{arguments::Arguments, arguments::estimator_options};
 use crate::error::Error;
 use crate::python::arrays::{self, ColourRule};
-use crate::python::field::FlowField;
-use crate::python::image::renamed;
-use crate::python::keywords::{constructor, with_common};
 use crate::python::options::{self, Integer, Object};
+use crate::python::{field::FlowField, image::renamed, keywords::constructor, keywords::with_common};
 use crate::simd::SimdReal;
 use crate::temporal::{AnyFlowStream, FlowStream, Stream, StreamPlan};
 use crate::types::AnyFrame;

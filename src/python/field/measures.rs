@@ -1,9 +1,8 @@
 //! What Python sees of a `FlowField`: derived quantities.
 
 use super::{FlowField, Store, derived, each};
-use crate::python::arrays;
-use crate::python::keywords::getters;
 use crate::python::options::{self, Region};
+use crate::python::{arrays, keywords::getters};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 

@@ -1,8 +1,7 @@
 //! What Python sees of a `FlowField`.
 
 use super::{FlowField, Slice, Store, each, state};
-use crate::python::keywords::getters;
-use crate::python::{arrays, io};
+use crate::python::{arrays, io, keywords::getters};
 use crate::types::{SamplingGrid, Status};
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::prelude::*;

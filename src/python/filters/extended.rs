@@ -1,7 +1,6 @@
 //! `ExtendedKalmanFilter`.
 
-use super::callback::{Callbacks, entry, lead, lock};
-use super::gaussian::GaussianFilter;
+use super::{callback::Callbacks, callback::entry, callback::lead, callback::lock, gaussian::GaussianFilter};
 use crate::filter::ExtendedFilter as Core;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -2,8 +2,7 @@
 
 use crate::error::Error;
 use crate::filter::{GaussianState, check_covariances, check_mean};
-use crate::python::arrays;
-use crate::python::keywords::getters;
+use crate::python::{arrays, keywords::getters};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -2,8 +2,7 @@
 
 use crate::error::Error;
 use crate::filter::{SigmaPoints, check_dimension};
-use crate::python::arrays;
-use crate::python::keywords::getters;
+use crate::python::{arrays, keywords::getters};
 use pyo3::prelude::*;
 
 /// Scaled sigma points (van der Merwe 2004): 2 n + 1 points with mean and covariance of the state.

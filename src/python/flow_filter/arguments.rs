@@ -2,9 +2,8 @@
 
 use crate::error::Error;
 use crate::filter::SigmaPoints;
-use crate::python::arrays;
-use crate::python::keywords::{keep_options, with_common};
 use crate::python::options::{self, Group, Integer, Object};
+use crate::python::{arrays, keywords::keep_options, keywords::with_common};
 use crate::temporal::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
 use pyo3::prelude::*;
 

@@ -3,9 +3,8 @@
 mod arguments;
 
 use super::arrays::{self, ColourRule};
-use super::field::FlowField;
-use super::keywords::{constructor, with_common};
 use super::options::{self, Integer, Object, PreprocessOptions};
+use super::{field::FlowField, keywords::constructor, keywords::with_common};
 use crate::error::Error;
 use crate::temporal::AnyFlowFilter;
 use crate::types::SamplingGrid;

@@ -8,9 +8,8 @@ use crate::error::Error;
 use crate::motion3d::{
     CommonEffect, FieldOptions, RotationPrior, UncertainMotion, contact_map, estimate_field_motion, field_points,
 };
-use crate::python::arrays;
-use crate::python::field::{FlowField, Store, each};
 use crate::python::options::{self, Integer, Region};
+use crate::python::{arrays, field::FlowField, field::Store, field::each};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 

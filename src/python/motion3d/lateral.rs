@@ -1,6 +1,6 @@
 //! Translations along the image plane, for Python.
 
-use super::given::{rows, word};
+use super::{given::rows, given::word};
 use crate::error::Error;
 use crate::motion3d::{LateralBound, LateralEstimate, LateralWeights, estimate_lateral, lateral_bound};
 use crate::python::arrays;

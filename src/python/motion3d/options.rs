@@ -1,10 +1,9 @@
 //! The core's options from the keywords of the Python function.
 
-use super::given::{square, triple, word};
+use super::{given::square, given::triple, given::word};
 use crate::error::Error;
 use crate::motion3d::{Method, Motion, MotionOptions, Placement, RotationPrior, Smoother};
-use crate::python::arrays;
-use crate::python::options::{Integer, threads};
+use crate::python::{arrays, options::Integer, options::threads};
 use pyo3::prelude::*;
 
 /// Where a displacement is taken to be the instantaneous flow, by name.

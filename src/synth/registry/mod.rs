@@ -9,10 +9,7 @@ mod scenes;
 pub use carriers::CARRIERS;
 pub use scenes::SCENES;
 
-use super::Scene;
-use super::carried::Carried;
-use super::motion::Motion;
-use super::texture::Texture;
+use super::{Scene, carried::Carried, motion::Motion, texture::Texture};
 use crate::error::{Error, Result};
 
 /// A number that a scene or carrier can be given.

@@ -1,8 +1,6 @@
 //! The scenes.
 
-use super::camera::CameraMotion;
-use super::path::Course;
-use super::sprite::Figure;
+use super::{camera::CameraMotion, path::Course, sprite::Figure};
 
 /// A scene by name.
 #[derive(Debug, Clone, Copy)]

@@ -1,6 +1,6 @@
 //! What a scene can be given.
 
-use super::list::{SCENES, TargetSceneKind};
+use super::{list::SCENES, list::TargetSceneKind};
 use crate::error::{Error, Result};
 
 /// Largest number of frames: the paths of camera and targets are kept in memory.

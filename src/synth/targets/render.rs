@@ -1,9 +1,6 @@
 //! From a scene to its frames.
 
-use super::colour::blend;
-use super::list::Pillar;
-use super::scene::TargetScene;
-use super::sprite::Drawing;
+use super::{colour::blend, list::Pillar, scene::TargetScene, sprite::Drawing};
 use crate::parallel::for_each_band;
 use crate::types::ColourFrame;
 use std::ops::Range;

@@ -2,7 +2,7 @@
 //!
 //! `A(m)` is block triangular: the Hessian feeds the gradient, the gradient feeds `I`, and `I` feeds nothing.
 
-use super::vector::{plus, times};
+use super::{vector::plus, vector::times};
 use crate::simd::Lanes;
 
 /// A step over one frame.

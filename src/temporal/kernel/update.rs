@@ -11,8 +11,7 @@
 // Unrolled loops compare constant indices, the smallest of which is zero.
 #![allow(clippy::absurd_extreme_comparisons)]
 
-use super::vector::for_six;
-use super::{BLOCK, Constants, Lane, N, PACKED, PLANES, SCALE, failed, packed};
+use super::{BLOCK, Constants, Lane, N, PACKED, PLANES, SCALE, failed, packed, vector::for_six};
 use crate::simd::{Kernel, Lanes, SimdReal};
 
 /// Normalised innovation squared beyond which the brightness starts anew: chi-square(6), one in ten thousand.

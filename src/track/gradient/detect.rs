@@ -1,7 +1,6 @@
 //! The first object that moves: its box from two frames, where nobody gave one.
 
-use super::noise::{NOISE_SAMPLES, noise_of};
-use super::shift::half_a_pixel_around;
+use super::{noise::NOISE_SAMPLES, noise::noise_of, shift::half_a_pixel_around};
 use crate::types::{Frame, TargetBox};
 
 /// Change over the noise of a difference that is one.

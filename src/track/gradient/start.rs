@@ -1,9 +1,7 @@
 //! How a tracker starts: the checks of the first frame, box and point, and the search for the first object
 //! that moves.
 
-use super::detect::{camera_moved, detect_moving_target};
-use super::layered;
-use super::options::CameraMotion;
+use super::{detect::camera_moved, detect::detect_moving_target, layered, options::CameraMotion};
 use crate::error::{Error, Result};
 use crate::image::all_finite;
 use crate::track::grey_levels::GREATEST;

@@ -11,8 +11,7 @@ use super::noise::{Noise, colour_gain};
 use super::prediction::FrameContext;
 use super::recovery::{Recovery, recover};
 use super::target::Target;
-use crate::math::quantile;
-use crate::math::random::CounterRng;
+use crate::math::{quantile, random::CounterRng};
 
 /// Quantile of the similarity over the particles that stands for the target.
 const SIMILARITY_QUANTILE: f64 = 0.9;

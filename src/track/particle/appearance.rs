@@ -1,6 +1,6 @@
 //! What a target looks like: banded colour histograms of its first box, compared with those of other boxes.
 
-use super::bins::{BINS, NO_BIN};
+use super::{bins::BINS, bins::NO_BIN};
 use crate::types::Frame;
 
 /// Bands of a box, from top to bottom.

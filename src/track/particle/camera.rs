@@ -1,7 +1,6 @@
 //! Motion of the background: an affine map fitted to the corner tracks, robust against those on targets.
 
-use crate::math::median;
-use crate::math::random::CounterRng;
+use crate::math::{median, random::CounterRng};
 
 /// Triples of tracks that are tried (least median of squares; P. Rousseeuw, 1984).
 const TRIPLES: u64 = 64;

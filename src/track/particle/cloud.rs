@@ -1,7 +1,6 @@
 //! Weighted particles of one target: centre x, y (px), velocity u, v (px/frame), width, height (px).
 
-use super::camera::CameraMotion;
-use super::noise::Noise;
+use super::{camera::CameraMotion, noise::Noise};
 use crate::filter::particle::{Resampling, effective_sample_size, normalise_log_weights};
 use crate::math::random::CounterRng;
 

@@ -1,8 +1,6 @@
 //! Which target a corner track belongs to.
 
-use super::appearance::CentredBox;
-use super::corners::Track;
-use super::geometry::{distance, holds};
+use super::{appearance::CentredBox, corners::Track, geometry::distance, geometry::holds};
 use crate::math::median;
 
 /// A label is kept, and gained, inside the target's box enlarged by this.

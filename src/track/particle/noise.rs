@@ -1,6 +1,6 @@
 //! Noise of the transition, and the other numbers in which the modes differ.
 
-use super::options::{ParticleMode, ParticleOptions};
+use super::{options::ParticleMode, options::ParticleOptions};
 
 /// Radius within which targets are near each other, in standard deviations of the position along each axis
 /// (equation (7) of the paper).

@@ -1,7 +1,6 @@
 //! Whether a target is hidden; running means of its similarity, velocity and number of tracks.
 
-use super::camera::CameraMotion;
-use super::cloud::Particle;
+use super::{camera::CameraMotion, cloud::Particle};
 
 /// Similarity below this share of the usual one is low.
 const LOW: f64 = 0.75;

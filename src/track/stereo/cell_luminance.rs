@@ -1,8 +1,7 @@
 //! Luminance reduced to the cells of the grid, and templates compared in it: equation (29) of the stereo
 //! paper.
 
-use super::exposure::Exposure;
-use super::voxels::Lattice;
+use super::{exposure::Exposure, voxels::Lattice};
 use crate::types::Frame;
 
 /// Levels of the reduced luminance.

@@ -1,6 +1,6 @@
 //! Voxels and edge pixels by the component that they belong to.
 
-use super::voxels::{EdgePoints, Lattice, Voxels};
+use super::{voxels::EdgePoints, voxels::Lattice, voxels::Voxels};
 use crate::math::median;
 
 /// Label of a voxel without a cluster.

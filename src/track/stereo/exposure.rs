@@ -3,8 +3,7 @@
 //! Lucas-Kanade assumes constant brightness: a gain error of 0.01 biases the motion by about 0.02 px. Both
 //! views of a pair have the same exposure, so disparities are not affected.
 
-use super::cluster_motion::PlaneMotion;
-use super::clusters::Clusters;
+use super::{cluster_motion::PlaneMotion, clusters::Clusters};
 use crate::image::Interpolation;
 use crate::math::{geman_mcclure, median, robust_std};
 use crate::types::Frame;

@@ -4,8 +4,7 @@
 mod task;
 
 use self::task::Task;
-use super::cluster_motion::PlaneMotion;
-use super::exposure::Exposure;
+use super::{cluster_motion::PlaneMotion, exposure::Exposure};
 use crate::image::GaussianSmoother;
 use crate::types::Frame;
 

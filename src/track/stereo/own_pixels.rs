@@ -3,9 +3,7 @@
 //! Half of the edge pixels along an outline lie just beyond it, on the background. They have the object's
 //! motion and disparity, but bias medians of positions. Their brightness is that of the background.
 
-use super::cluster_motion::middle;
-use super::cluster_motion::places;
-use super::clusters::Clusters;
+use super::{cluster_motion::middle, cluster_motion::places, clusters::Clusters};
 use crate::image::Interpolation;
 use crate::types::Frame;
 

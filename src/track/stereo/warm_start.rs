@@ -6,8 +6,7 @@ mod split_merge;
 
 use self::blobs::{Blob, blobs, log_density};
 pub(super) use self::split_merge::split_and_merge;
-use super::options::MIN_COMPONENT_PIXELS;
-use super::voxels::Voxels;
+use super::{options::MIN_COMPONENT_PIXELS, voxels::Voxels};
 use crate::error::Result;
 use crate::mixture::{Points, Posterior};
 use nalgebra::Matrix3;

@@ -5,8 +5,7 @@
 //! direction.
 
 use super::binomial_mean;
-use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
-use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;
+use crate::flow::coarse_to_fine::{planes::Planes, planes::SITE_SPACING, refine::SITES_PER_NODE};
 use crate::simd::SimdReal;
 use rayon::prelude::*;
 

@@ -1,6 +1,6 @@
 //! Constrained directions: where the data determine the motion, and in which directions.
 
-use super::noise::{ALL, NONE, Noise, UnconstrainedDirections};
+use super::{noise::ALL, noise::NONE, noise::Noise, noise::UnconstrainedDirections};
 use crate::flow::coarse_to_fine::data_term::{MIN_USABLE_SHARE, SEEN, UU, UV, VV};
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;

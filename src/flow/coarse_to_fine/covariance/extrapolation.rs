@@ -4,8 +4,7 @@
 //! M(p)` are measured along both axes; their mean squares are the variances of motion extrapolated by `d`.
 //! Mean absolute values give them, as for Gaussian errors, so that motion boundaries do not dominate.
 
-use super::data_support::DataSupport;
-use super::{Entries, curvature_bias};
+use super::{Entries, curvature_bias, data_support::DataSupport};
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, WindowStatistics};
 use crate::flow::symmetric::upper;

@@ -28,9 +28,7 @@ mod first_frame;
 mod map;
 mod noise;
 
-use super::estimate::Estimate;
-use super::peak_locking::PeakLocking;
-use super::planes::Planes;
+use super::{estimate::Estimate, peak_locking::PeakLocking, planes::Planes};
 use crate::ablation::keeps;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;

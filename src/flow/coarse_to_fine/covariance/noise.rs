@@ -16,7 +16,7 @@
 //! twenty-four times. The factors come from simulated white noise. Where motion leads out of a frame, that
 //! edge is extrapolated with the noisy slopes of the data windows.
 
-use super::data_support::{DataSupport, Edge};
+use super::{data_support::DataSupport, data_support::Edge};
 use crate::flow::coarse_to_fine::data_term::{SEEN, UU, UV, VV};
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, TERMS, WindowStatistics};

@@ -6,7 +6,7 @@ use super::moments::{ERROR, horizontal, normal, right, vertical};
 use super::products::{Weights, products_row, residuals, vertical_stencils};
 use super::scratch::{CHUNK, Columns, IMAGE, PRODUCTS, RING, Scratch};
 use super::warp::warp_row;
-use crate::flow::coarse_to_fine::planes::{LEFT as GRID_LEFT, Planes};
+use crate::flow::coarse_to_fine::{planes::LEFT as GRID_LEFT, planes::Planes};
 use crate::simd::{Kernel, Lanes, SimdReal};
 use std::ops::Range;
 

@@ -1,7 +1,7 @@
 //! Motion at every pixel: between sites, parabolas with the values of both and the change of their slopes.
 
-use super::scratch::{Columns, LEFT};
-use crate::flow::coarse_to_fine::planes::{LEFT as GRID_LEFT, Planes};
+use super::{scratch::Columns, scratch::LEFT};
+use crate::flow::coarse_to_fine::{planes::LEFT as GRID_LEFT, planes::Planes};
 use crate::simd::Lanes;
 
 /// Motion at the pixels of row `y`, in the halves of `u` and of `v`.

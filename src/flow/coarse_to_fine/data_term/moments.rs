@@ -14,7 +14,7 @@
 //! with `x_0, x_1, x_2 = 1, x, y` px from the site, `g` the window (sum 1), `G` the squared weight of the
 //! gradient rows and `w` between 0 (not usable) and 1. [`normal`] and [`right`] name the planes.
 
-use super::scratch::{CHUNK, Columns, LEFT};
+use super::{scratch::CHUNK, scratch::Columns, scratch::LEFT};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::{self, Planes};
 use crate::parallel::for_each_band;

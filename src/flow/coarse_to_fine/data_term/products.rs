@@ -1,6 +1,6 @@
 //! Contributions of one pixel's equations to the normal equations.
 
-use super::scratch::{Columns, IMAGE, LEFT, PRODUCTS};
+use super::{scratch::Columns, scratch::IMAGE, scratch::LEFT, scratch::PRODUCTS};
 use crate::simd::{Lanes, SimdReal};
 
 /// Cubic B-spline stencils down the columns: value b = [1, 4, 1]/6, slope d = [-1, 0, 1]/2, curvature s = [1,

@@ -1,7 +1,6 @@
 //! Views along the motion: their mean, their rate, and where all of them are usable.
 
-use super::View;
-use super::scratch::Columns;
+use super::{View, scratch::Columns};
 use crate::simd::{Lanes, SimdReal};
 use crate::types::Mask;
 

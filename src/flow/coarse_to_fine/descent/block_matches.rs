@@ -5,8 +5,7 @@
 //! cross-correlation", 1995). Sites take what was found where it leaves less residual energy
 //! ([`super::comparison`]).
 
-use crate::flow::coarse_to_fine::data_term::View;
-use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
+use crate::flow::coarse_to_fine::{data_term::View, planes::Planes, planes::SITE_SPACING};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::Frame;
 use rayon::prelude::*;

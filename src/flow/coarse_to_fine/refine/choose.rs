@@ -4,8 +4,7 @@
 use super::RefineOptions;
 use super::ladder::{Ladder, MAX_OCTAVE, difference_variance};
 use super::regional_means::Layout;
-use crate::flow::coarse_to_fine::plane_pool::PlanePool;
-use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
+use crate::flow::coarse_to_fine::{plane_pool::PlanePool, planes::LEFT, planes::Planes};
 use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 

@@ -7,10 +7,7 @@
 //! Slopes are taken from the best windows some steps wider: at a motion step, a window's fit has a slope that
 //! no motion has, which reaches as far as the window.
 
-use super::choose::{Choice, Use};
-use super::fit::FIT;
-use super::plain_fits::any_positive;
-use super::upsample::widen;
+use super::{choose::Choice, choose::Use, fit::FIT, plain_fits::any_positive, upsample::widen};
 use crate::flow::coarse_to_fine::extended::{Field, RIM, chunk_of};
 use crate::flow::coarse_to_fine::planes::{CHUNK, LEFT};
 use crate::simd::{Lanes, SimdReal};

@@ -1,6 +1,6 @@
 //! Affine fits to the flow in Gaussian windows, and the grids they are computed on.
 
-use super::ladder::{EXTRA_PASSES, Scale, TERMS, Taps};
+use super::{ladder::EXTRA_PASSES, ladder::Scale, ladder::TERMS, ladder::Taps};
 use crate::flow::coarse_to_fine::extended::{Continuation, Field, RIM};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::LEFT;

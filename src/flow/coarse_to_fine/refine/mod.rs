@@ -33,9 +33,7 @@ mod regional_means;
 mod upsample;
 mod window_statistics;
 
-use super::extended::Field;
-use super::plane_pool::PlanePool;
-use super::planes::{LEFT, Planes, SITE_SPACING};
+use super::{extended::Field, plane_pool::PlanePool, planes::LEFT, planes::Planes, planes::SITE_SPACING};
 use crate::simd::{Level, SimdReal};
 use fit::{FIT, FLOW};
 pub(super) use ladder::TERMS;

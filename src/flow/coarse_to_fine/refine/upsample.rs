@@ -1,7 +1,6 @@
 //! Interpolation from coarse sites to fine ones.
 
-use super::choose::Choice;
-use super::ladder::MAX_OCTAVE;
+use super::{choose::Choice, ladder::MAX_OCTAVE};
 use crate::flow::coarse_to_fine::extended::{Continuation, Field, RIM};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::LEFT;

@@ -21,8 +21,7 @@ mod wavefront;
 #[cfg(test)]
 mod tests;
 
-use super::data_term::{ERROR, VALID};
-use super::planes::{LEFT, Planes};
+use super::{data_term::ERROR, data_term::VALID, planes::LEFT, planes::Planes};
 use crate::math::median;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;

@@ -5,8 +5,7 @@ use super::smoothness::{
 };
 use super::solve::{ENTRIES, PLACES, factorise, solve};
 use super::{EQUATIONS, HALF_SPACING};
-use crate::flow::coarse_to_fine::data_term::{ERROR, normal, right};
-use crate::flow::coarse_to_fine::planes::LEFT;
+use crate::flow::coarse_to_fine::{data_term::ERROR, data_term::normal, data_term::right, planes::LEFT};
 use crate::simd::{Lanes, SimdReal};
 use std::ops::Range;
 

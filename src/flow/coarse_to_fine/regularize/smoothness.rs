@@ -1,8 +1,7 @@
 //! Robust smoothness terms: strain between neighbours, weights, and contributions to a site's matrix.
 
-use super::solve::{ENTRIES, Guard, lower};
-use super::{HALF_SPACING, Smoothness};
-use crate::flow::coarse_to_fine::planes::{LEFT, Planes};
+use super::{HALF_SPACING, Smoothness, solve::ENTRIES, solve::Guard, solve::lower};
+use crate::flow::coarse_to_fine::{planes::LEFT, planes::Planes};
 use crate::simd::{Lanes, SimdReal};
 
 /// The values of an expression for each index in a list, written out: no optimiser unrolls these.

@@ -3,8 +3,7 @@
 pub(super) mod first_frame;
 pub(super) mod rows;
 
-use super::data_term::MOTION;
-use super::planes::{LEFT, Planes};
+use super::{data_term::MOTION, planes::LEFT, planes::Planes};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use rayon::prelude::*;
 use rows::RowReader;

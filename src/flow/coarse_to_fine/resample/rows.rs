@@ -1,7 +1,6 @@
 //! Rows of pixels interpolated from planes on every second pixel.
 
-use crate::flow::coarse_to_fine::data_term::MOTION;
-use crate::flow::coarse_to_fine::planes::Planes;
+use crate::flow::coarse_to_fine::{data_term::MOTION, planes::Planes};
 use crate::simd::SimdReal;
 
 /// Reads planes on the sites (every second pixel) at the pixels of a row; keeps its memory between rows.

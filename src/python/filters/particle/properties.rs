@@ -1,6 +1,6 @@
 //! Particles, weights, estimates and counts.
 
-use super::class::{ParticleFilter, particles};
+use super::{class::ParticleFilter, class::particles};
 use crate::error::Error;
 use crate::filter::particle::ParticleFilter as Core;
 use crate::python::arrays;

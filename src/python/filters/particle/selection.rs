@@ -3,8 +3,7 @@
 use crate::error::Error;
 use crate::filter::particle::{Resampling, resample_indices};
 use crate::math::random::CounterRng;
-use crate::python::arrays;
-use crate::python::options::{Integer, count};
+use crate::python::{arrays, options::Integer, options::count};
 use pyo3::prelude::*;
 use std::cell::Cell;
 

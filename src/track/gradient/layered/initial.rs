@@ -4,8 +4,7 @@
 //! first frame is therefore kept, and the displacement since then is found that explains the changes: the
 //! displaced box shows the first box moved along, or the scene as it was.
 
-use super::layers::{Target, holds};
-use super::patch::{Bounds, Patch, bounds_about};
+use super::{layers::Target, layers::holds, patch::Bounds, patch::Patch, patch::bounds_about};
 use crate::track::gradient::shift::half_a_pixel_around;
 use crate::types::{Frame, TargetBox};
 

@@ -3,8 +3,7 @@
 //! The edge of an occluder is mistaken for the target's own: a similarity that follows it shrinks and lags,
 //! and a filter that believes it misleads the search where the target reappears.
 
-use super::finding::{Finding, MIN_VISIBILITY_LOSS};
-use super::state::{LastGood, State};
+use super::{finding::Finding, finding::MIN_VISIBILITY_LOSS, state::LastGood, state::State};
 use crate::types::TargetBox;
 
 /// Frames after which the state from before is too old to go on from.

@@ -3,8 +3,7 @@
 //!
 //! `C(xi) = g a(xi) T(xi) + (1 - a(xi)) Bg(W(xi))`.
 
-use super::patch::{Patch, Places, bounds_about, wide};
-use super::pose::Pose;
+use super::{patch::Patch, patch::Places, patch::bounds_about, patch::wide, pose::Pose};
 use crate::image::{cubic_at, fill_holes};
 use crate::types::{Frame, TargetBox};
 

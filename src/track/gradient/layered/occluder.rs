@@ -1,7 +1,6 @@
 //! Which pixels of the first box are the target's, and which are of an object at rest in front of it.
 
-use super::initial::{Changes, InitialSegmentation};
-use super::patch::{smooth_known, wide};
+use super::{initial::Changes, initial::InitialSegmentation, patch::smooth_known, patch::wide};
 use crate::math::robust_std;
 use crate::types::Frame;
 use std::cmp::Reverse;

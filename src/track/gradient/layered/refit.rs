@@ -2,9 +2,8 @@
 //! without the box ([`detect_moving_target`]). It is the target if it has clearly other sides, the rest of
 //! the box stayed and looks different, and what the box leaves out moved along.
 
-use super::initial::{Changes, InitialSegmentation};
-use super::layers::{grown, holds};
-use crate::track::gradient::detect::{MovingTarget, detect_moving_target};
+use super::{initial::Changes, initial::InitialSegmentation, layers::grown, layers::holds};
+use crate::track::gradient::{detect::MovingTarget, detect::detect_moving_target};
 use crate::types::{Frame, TargetBox};
 
 /// Frames in which that may be seen: what turns or grows leaves its box later.

@@ -1,7 +1,6 @@
 //! What the tracker reports of the target.
 
-use super::finding::Finding;
-use super::state::State;
+use super::{finding::Finding, state::State};
 use crate::types::{TrackState, TrackStatus};
 
 /// Frames without a measurement after which the target is lost.

@@ -1,6 +1,6 @@
 //! Pixels of a frame that its motion is measured on, and gradient steps over all of them.
 
-use super::layers::{holds, is_inside};
+use super::{layers::holds, layers::is_inside};
 use crate::image::{Interpolation, cubic_at};
 use crate::math::robust_std;
 use crate::types::{Frame, TargetBox};

@@ -6,8 +6,7 @@ use super::learn;
 use super::light::Light;
 use super::samples::{SCATTER_SAMPLES, SCENE_MARGIN, spread};
 use super::state::{MIN_NOISE, State};
-use crate::track::gradient::noise::scatter_of;
-use crate::track::gradient::options::CameraMotion;
+use crate::track::gradient::{noise::scatter_of, options::CameraMotion};
 use crate::types::{Frame, TargetBox};
 
 /// Scatter of the still scene's change beyond which a frame is wild: times the noise, and grey levels.

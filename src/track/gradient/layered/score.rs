@@ -1,7 +1,6 @@
 //! What is seen of the target at a pose, and what there is beside it that looks like it.
 
-use super::layers::{Background, CORE, Target, is_inside};
-use super::pose::Pose;
+use super::{layers::Background, layers::CORE, layers::Target, layers::is_inside, pose::Pose};
 use crate::types::Frame;
 
 /// Contrast at which a point counts in full, grey levels.

@@ -1,7 +1,6 @@
 //! Looking for the target all around, in whole pixels.
 
-use super::layers::{Background, CORE, Target, is_inside};
-use super::pose::Pose;
+use super::{layers::Background, layers::CORE, layers::Target, layers::is_inside, pose::Pose};
 use crate::image::cubic_at;
 use crate::types::Frame;
 

@@ -1,7 +1,6 @@
 //! What an alignment is given: layers, what may change, and which points have no vote.
 
-use super::layers::{Background, Target};
-use super::pose::Increment;
+use super::{layers::Background, layers::Target, pose::Increment};
 use crate::types::Frame;
 use nalgebra::{SMatrix, SVector};
 

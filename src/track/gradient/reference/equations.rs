@@ -1,8 +1,7 @@
 //! The gradient equation in the windows around all pixels, summed: M. Chiba and S. Ozawa, equations (5) to
 //! (8).
 
-use super::kernels::{DerivativeKernels, REACH, SIDE};
-use super::options::LocalFlowOptions;
+use super::{kernels::DerivativeKernels, kernels::REACH, kernels::SIDE, options::LocalFlowOptions};
 use crate::image::StructureTensor;
 use crate::types::Frame;
 

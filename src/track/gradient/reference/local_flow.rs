@@ -1,11 +1,8 @@
 //! Flow of single pixels from the gradient equation in a small window: M. Chiba and S. Ozawa, equations (1)
 //! to (10).
 
-use super::equations::Equations;
-use super::kernels::kernels_of;
-use super::options::LocalFlowOptions;
-use crate::track::gradient::noise::{NOISE_SAMPLES, noise_of};
-use crate::track::gradient::shift::shifted;
+use super::{equations::Equations, kernels::kernels_of, options::LocalFlowOptions};
+use crate::track::gradient::{noise::NOISE_SAMPLES, noise::noise_of, shift::shifted};
 use crate::types::Frame;
 
 /// Weakest gradient that counts, over the noise.

@@ -2,8 +2,7 @@
 
 use super::kernels::gradient_of_rounding;
 use crate::error::{Error, Result};
-use crate::track::gradient::gauss_markov::{Dynamics, Velocity};
-use crate::track::gradient::options::CameraMotion;
+use crate::track::gradient::{gauss_markov::Dynamics, gauss_markov::Velocity, options::CameraMotion};
 
 /// How local flow is computed and what is accepted of it.
 #[derive(Debug, Clone, Copy, PartialEq)]

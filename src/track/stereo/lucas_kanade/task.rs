@@ -1,6 +1,6 @@
 //! Gauss-Newton iterations for one cluster, level by level.
 
-use super::super::cluster_motion::{PlaneMotion, middle};
+use super::super::{cluster_motion::PlaneMotion, cluster_motion::middle};
 use super::{FINE, MAX_RESIDUAL, MAX_VOTERS, MIN_AFFINE_PIXELS, MIN_NOISE_STD, MIN_STEP, PRIOR_STD, SmoothedLevels};
 use crate::math::{geman_mcclure, robust_std};
 use crate::types::{AffineFlow, Frame};

@@ -1,6 +1,6 @@
 //! Options out of range are refused by name.
 
-use super::super::clock::{MAX_REACH, STEP_TIME_RANGE};
+use super::super::{clock::MAX_REACH, clock::STEP_TIME_RANGE};
 use super::{StereoCamera, StereoTrackerOptions, VoxelGrid};
 use crate::error::{Error, Result};
 

@@ -7,8 +7,7 @@ use super::super::graph::Arc;
 use super::super::options::ARC_THRESHOLD;
 use super::super::overlap::{Row, moved_overlaps};
 use super::super::succession::successors;
-use super::StereoTracker;
-use super::cluster::Clustered;
+use super::{StereoTracker, cluster::Clustered};
 
 /// Overlaps of two steps' clusters, forwards and backwards.
 type Overlaps = (Vec<Row>, Vec<Row>);

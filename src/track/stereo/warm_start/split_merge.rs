@@ -1,8 +1,7 @@
 //! Splits and merges the components of a cold start, so that each holds one object.
 
-use super::super::options::MIN_COMPONENT_PIXELS;
-use super::super::voxels::Voxels;
-use super::blobs::{Blob, blobs, split_gain, within};
+use super::super::{options::MIN_COMPONENT_PIXELS, voxels::Voxels};
+use super::{blobs::Blob, blobs::blobs, blobs::split_gain, blobs::within};
 use crate::error::Result;
 use crate::mixture::{Points, Posterior};
 use std::collections::BTreeSet;
