@@ -106,9 +106,9 @@ impl AffinePatches<'_> {
 /// excludes are reported as for points.
 ///
 /// # Errors
-/// [`Error::Argument`](crate::error::Error::Argument) naming what has the wrong length: `flow`, `cov`; `robust`,
-/// `weight_inv_depth`, `rotation_prior`, `points_per_independent_sample` and `correlation_length`, which this
-/// form does not have.
+/// [`Error::Argument`](crate::error::Error::Argument) naming what has the wrong length: `flow`, `cov`;
+/// `robust`, `weight_inv_depth`, `rotation_prior`, `points_per_independent_sample` and `correlation_length`,
+/// which this form does not have.
 pub fn estimate_patch_motion(patches: &AffinePatches<'_>, options: &MotionOptions) -> Result<MotionEstimate> {
     patches.check()?;
     let given = |option: Option<f64>, default: f64| option.is_some_and(|value| value != default);
