@@ -174,7 +174,7 @@ fn mistakes_are_named_and_leave_nothing() {
         ("track s.y4m --point 1", &["--point"]),
         ("track s.y4m --camera shaky", &["--camera"]),
         ("track s.y4m --model cubic", &["--model", "affine"]),
-        ("track s.y4m -o out --format xml", &["format", "csv or mot"]),
+        ("track s.y4m -o out --format xml", &["format", "one of csv, mot"]),
         ("track s.y4m -o t.mp4", &["output", ".csv"]),
         ("track s.y4m -o t.csv --format csv,mot", &["output", "folder"]),
         ("track s.y4m --format csv,mot", &["output", "folder"]),
