@@ -1,6 +1,7 @@
 //! The status of a motion, and which directions explain the flow as well as the estimate does.
 
 use super::{planar_twin::planar_twin, solution::Solution};
+use crate::ablation::keeps;
 use crate::math::{random::CounterRng, tangents};
 use crate::motion3d::kernels::{Bilinear, Weighted, best_rotation, depths, equations, front_equations, information};
 use crate::motion3d::model::motion::Motion;
@@ -143,6 +144,9 @@ fn far(observations: &Observations, motions: &[Motion], own: f64, rng: CounterRn
     });
     if doubts.is_empty() || doubts.iter().any(|(.., decides)| *decides) {
         return !doubts.is_empty();
+    }
+    if !keeps("motion3d.region_by_chance") {
+        return false;
     }
     doubts.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut doubts: Vec<_> = doubts.into_iter().take(COMPARED).map(|(motion, cost, _)| (motion, cost)).collect();
