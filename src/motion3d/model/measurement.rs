@@ -1,7 +1,7 @@
 //! What is measured at one place, of points and patches alike.
 
 use super::{motion::Motion, rows::Matrix5, rows::Vector5};
-use nalgebra::{Matrix2x3, RowVector2, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, RowVector2, SMatrix, SVector, Vector3};
 
 /// `f = A(u) lambda + R w + noise` of unit covariance: N numbers, whose L unknowns `lambda` are the inverse
 /// depth and, of a patch, its slopes.
@@ -68,7 +68,7 @@ impl<const N: usize, const L: usize> Measurement<N, L> {
         let known = if inverse.is_some() { SMatrix::identity() } else { SMatrix::zeros() };
         let across: SMatrix<f64, N, N> = known - a * covariance * a.transpose();
         let cost = rest.dot(&(across * rest)).max(0.0);
-        Explained { surface: covariance * a.transpose() * rest, covariance, across, rest, cost }
+        Explained { surface: covariance * (a.transpose() * rest), covariance, across, rest, cost }
     }
 
     /// `[A(E_u) lambda, R]`: slopes by `(psi, w)`.
@@ -101,12 +101,10 @@ impl<const N: usize, const L: usize> Measurement<N, L> {
         x: &SMatrix<f64, N, N>,
     ) -> Matrix5 {
         let along = [0, 1].map(|axis| self.along(&tangent.row(axis).transpose()));
-        let mut noise = Matrix5::zeros();
-        for i in 0..2 {
-            for j in 0..2 {
-                noise[(i, j)] = (covariance * along[i].transpose() * x * along[j]).trace();
-            }
-        }
+        let weighted = along.map(|along| x * along);
+        let of = |i: usize, j: usize| covariance.dot(&(along[i].transpose() * weighted[j]));
+        let (across, mut noise) = (of(0, 1), Matrix5::zeros());
+        noise.fixed_view_mut::<2, 2>(0, 0).copy_from(&Matrix2::new(of(0, 0), across, across, of(1, 1)));
         noise
     }
 

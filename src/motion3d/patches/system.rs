@@ -64,7 +64,7 @@ impl<const N: usize, const L: usize> System<N, L> {
         motion: &Motion,
         tangent: &Matrix2x3<f64>,
         surfaces: Option<&[SVector<f64, L>]>,
-        see: fn(&Measurement<N, L>, &Motion) -> Explained<N, L>,
+        see: impl Fn(&Measurement<N, L>, &Motion) -> Explained<N, L>,
     ) -> Equations {
         let mut sums = Equations::default();
         for (k, one) in self.all.iter().enumerate() {
@@ -115,8 +115,8 @@ impl<const N: usize, const L: usize> System<N, L> {
         self.descend(start, Measurement::seen_in_front)
     }
 
-    fn descend(&self, start: &Motion, see: fn(&Measurement<N, L>, &Motion) -> Explained<N, L>) -> Minimum {
-        let sums = |motion: &Motion, tangent: &Matrix2x3<f64>| self.sums(motion, tangent, None, see);
+    fn descend(&self, start: &Motion, see: impl Fn(&Measurement<N, L>, &Motion) -> Explained<N, L>) -> Minimum {
+        let sums = |motion: &Motion, tangent: &Matrix2x3<f64>| self.sums(motion, tangent, None, &see);
         descend(*start, StoppingCriteria::FULL, self.all.len(), sums)
     }
 

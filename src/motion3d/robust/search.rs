@@ -15,6 +15,9 @@ use std::iter::once;
 const SEARCHED: usize = 400;
 const SAMPLES: usize = 100;
 
+/// Points after which a sum is compared.
+const PART: usize = 4 * ALIGN;
+
 /// Residuals `(c - q . w)` of one direction, in units of their bounds, as planes `q_x, q_y, q_z, c`.
 struct TruncatedCost<'a> {
     rows: &'a [Vec<f64>; 4],
@@ -26,21 +29,28 @@ impl Kernel<f64> for TruncatedCost<'_> {
     /// The rotation with the least `sum min(e^2, 1)`, and that.
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) -> Option<(usize, f64)> {
-        let [x, y, z, c] = self.rows;
-        let cut2 = V::constant(1.0);
+        let (length, cut2) = (self.rows[0].len(), V::constant(1.0));
         let mut best: Option<(usize, f64)> = None;
         for (index, w) in self.rotations.iter().enumerate() {
             let (wx, wy, wz) = (V::splat(w.x), V::splat(w.y), V::splat(w.z));
-            let mut sum = V::zero();
-            for i in (0..c.len()).step_by(V::LANES) {
-                let rest = V::load(&x[i..]).neg_mul_add(wx, V::load(&c[i..]));
-                let rest = V::load(&y[i..]).neg_mul_add(wy, rest);
-                let rest = V::load(&z[i..]).neg_mul_add(wz, rest);
-                sum = sum + (rest * rest).min(cut2);
+            let (mut sum, mut cost) = (V::zero(), 0.0);
+            // Sums only grow: those above the least are not completed.
+            for part in (0..length).step_by(PART) {
+                let end = length.min(part + PART);
+                let [x, y, z, c] = self.rows.each_ref().map(|row| row[part..end].chunks_exact(V::LANES));
+                for (((x, y), z), c) in x.zip(y).zip(z).zip(c) {
+                    let rest = V::load(x).neg_mul_add(wx, V::load(c));
+                    let rest = V::load(y).neg_mul_add(wy, rest);
+                    let rest = V::load(z).neg_mul_add(wz, rest);
+                    sum = sum + (rest * rest).min(cut2);
+                }
+                let mut lanes = [0.0; ALIGN];
+                sum.store(&mut lanes[..V::LANES]);
+                cost = lanes[..V::LANES].iter().sum();
+                if best.is_some_and(|(_, least)| cost >= least) {
+                    break;
+                }
             }
-            let mut lanes = [0.0; ALIGN];
-            sum.store(&mut lanes[..V::LANES]);
-            let cost: f64 = lanes[..V::LANES].iter().sum();
             if best.is_none_or(|(_, least)| cost < least) {
                 best = Some((index, cost));
             }
