@@ -236,7 +236,7 @@ fn peak_memory(child: &Child) -> Option<u64> {
 #[test]
 fn memory_does_not_grow_with_the_stream() {
     let place = Place::new();
-    let mut child = start(&place, "flow - --points 20,20 --points 40,30 -o rows.csv --threads 2 --quiet");
+    let mut child = start(&place, "flow - --points 20,20 --points 40,30 -o rows.csv --preset fast --threads 2 --quiet");
     let mut pipe = child.stdin.take().unwrap();
     pipe.write_all(&header()).unwrap();
     let (mut early, mut late) = (0, 0);

@@ -74,7 +74,7 @@ fn a_slow_mover_is_found_or_reported() {
 fn points_among_rejected_ones_do_not_pull_the_motion() {
     let (camera, aside) = (Motion::new([0.6, 0.2, 0.75], [0.01, -0.015, 0.005]), [-0.8, 0.1, 0.3]);
     let (mut held, mut wrong) = (Held::default(), 0);
-    for seed in 0..300 {
+    for seed in 0..100 {
         let depth = |x: f64, y: f64, _: f64| 0.0148 * smooth(x, y);
         let mut scene = Scene::new(camera, 1000, 0.6, 0.0006, seed, depth);
         let other = Motion::new(aside, [0.0, 0.01, 0.02]);
@@ -93,7 +93,7 @@ fn points_among_rejected_ones_do_not_pull_the_motion() {
     }
     let wrong = wrong as f64 / (1000.0 * f64::from(held.of));
     // So slow an object is hard to detect: with those points a quarter of the ellipsoids would not hold.
-    assert!(held.of >= 150 && held.honest() && wrong < 0.025, "{held:?}, {wrong}");
+    assert!(held.of >= 50 && held.honest() && wrong < 0.025, "{held:?}, {wrong}");
 }
 
 /// A disc of 30 % of the points moves by itself, in noise of a tenth of the flow: with the rest of the scene
@@ -101,10 +101,10 @@ fn points_among_rejected_ones_do_not_pull_the_motion() {
 /// but those of a part pull another way, and two motions explain the points better.
 #[test]
 fn what_an_object_and_the_scene_share_together_is_not_trusted() {
-    let noise_std = 1e-3;
+    let (noise_std, mut wrong) = (1e-3, 0);
     for noise in [Noise::StandardDeviation(noise_std), Noise::Unknown, Noise::StandardDeviation(0.5 * noise_std)] {
-        let (mut trusted, mut wrong) = (0, 0);
-        for seed in 0..60 {
+        let mut trusted = 0;
+        for seed in 0..40 {
             let rng = CounterRng::new(seed).stream(7);
             let normal = |j: u64| std::array::from_fn(|i| rng.normal(3 * j + i as u64));
             let w = normal(1).map(|value: f64| 0.01 * value);
@@ -126,6 +126,7 @@ fn what_an_object_and_the_scene_share_together_is_not_trusted() {
                 wrong += u32::from(off > 15.0 && off > 4.0 * found.direction_std);
             }
         }
-        assert!(wrong <= 1 && trusted >= 6, "{noise:?}: {wrong} of {trusted}");
+        assert!(trusted >= 4, "{noise:?}: {trusted}");
     }
+    assert!(wrong <= 2, "{wrong}");
 }

@@ -50,7 +50,7 @@ impl Made {
 /// many go the opposite way.
 fn silently_wrong(truth: &Motion, n: u64, h: f64, r: f64, noise_std: f64, method: Method) -> (u32, u32, u32) {
     let (mut confident, mut wrong, mut opposite) = (0, 0, 0);
-    for seed in 0..60 {
+    for seed in 0..24 {
         let found = Made::new(truth, n, h, r, noise_std, seed).estimate(method);
         if found.status == Status::Ok {
             let turned = found.motion.angle_to(truth).to_degrees() > 90.0;
@@ -73,13 +73,13 @@ fn patches_that_determine_nothing_are_not_trusted() {
         {
             for method in [Method::Auto, Method::MaximumLikelihood] {
                 let (sure, off, opposite) = silently_wrong(&truth, n, h, r, noise_std, method);
-                assert!(opposite == 0 && off <= 3, "{truth:?} {n} {h} {r} {method:?}: {opposite}, {off} of {sure}");
+                assert!(opposite == 0 && off <= 1, "{truth:?} {n} {h} {r} {method:?}: {opposite}, {off} of {sure}");
                 confident += sure;
                 wrong += off;
             }
         }
     }
-    assert!(confident > 300 && wrong * 50 <= confident, "{wrong} of {confident}");
+    assert!(confident > 120 && wrong * 50 <= confident, "{wrong} of {confident}");
 }
 
 /// The same two or three places again and again leave as many motions as two or three patches do.
