@@ -32,6 +32,7 @@ VARIANTS: dict[str, list[str]] = {
     "rlib too": [],
     "without AVX-512": [],
     "lto thin": ["lto='thin'"],
+    "lto thin, 1 unit": ["lto='thin'", "package.jacoflow.codegen-units=1"],
 }
 """What is changed in `[profile.ci]`."""
 ESTIMATE = """
