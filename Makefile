@@ -6,11 +6,8 @@ BIN := $(VENV)/bin
 WHEELS := target/wheels
 # One profile for all that the check runs: crates that it depends on are built once.
 CI := --profile ci
-# Kernels that this processor cannot run are not compiled for what is only run here.
-AVX512 := $(shell grep -qsw avx512vl /proc/cpuinfo && echo ,avx512)
 # Rust's tests also look for overflow and failed assertions.
 CHECKED := --config profile.ci.package.jacoflow.overflow-checks=true --config profile.ci.package.jacoflow.debug-assertions=true
-TESTED := --no-default-features --features cli,reference$(AVX512)
 
 .PHONY: test checks of-rust of-python demo format clippy features rustdoc rust-test guide wheel packages install pytest stubtest typing examples develop docs compare readme ablation clean
 
@@ -54,9 +51,9 @@ rustdoc:
 
 # Unit tests have a library of their own, which takes longer to optimise than to run as it is.
 rust-test:
-	cargo test $(CI) $(CHECKED) $(TESTED) --test '*'
-	cargo test $(CI) $(CHECKED) $(TESTED) --doc
-	cargo test $(CI) $(CHECKED) $(TESTED) --lib --config profile.ci.package.jacoflow.opt-level=0
+	cargo test $(CI) $(CHECKED) --features reference --test '*'
+	cargo test $(CI) $(CHECKED) --features reference --doc
+	cargo test $(CI) $(CHECKED) --features reference --lib --config profile.ci.package.jacoflow.opt-level=0
 
 # The page that tells how to add a motion model, followed to the letter in a copy.
 guide:
@@ -68,7 +65,7 @@ $(BIN)/maturin:
 
 wheel: $(BIN)/maturin
 	rm -rf $(WHEELS)
-	$(BIN)/maturin build -q $(CI) --no-default-features --features python$(AVX512) --out $(WHEELS) -i $(BIN)/python
+	$(BIN)/maturin build -q $(CI) --out $(WHEELS) -i $(BIN)/python
 
 # What the package and its tests need beside the wheel.
 packages: $(BIN)/maturin
@@ -112,7 +109,7 @@ readme: $(BIN)/maturin
 ablation: $(BIN)/maturin
 	$(PYTHON) -m venv $(VENV)-ablation
 	rm -rf target/wheels-ablation
-	$(BIN)/maturin build -q $(CI) --no-default-features --features python,ablation$(AVX512) --out target/wheels-ablation -i $(BIN)/python
+	$(BIN)/maturin build -q $(CI) --features python,ablation --out target/wheels-ablation -i $(BIN)/python
 	$(VENV)-ablation/bin/python -m pip install -q --force-reinstall --no-deps target/wheels-ablation/jacoflow-*.whl
 	$(VENV)-ablation/bin/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/target/wheels-ablation/jacoflow-*.whl)"
 	$(VENV)-ablation/bin/python -m benchmarks.ablation $(ARGUMENTS)

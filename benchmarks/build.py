@@ -30,7 +30,6 @@ VARIANTS: dict[str, list[str]] = {
     "opt-level 1": ["package.jacoflow.opt-level=1"],
     "line tables": ["package.jacoflow.debug='line-tables-only'"],
     "rlib too": [],
-    "without AVX-512": [],
     "lto thin": ["lto='thin'"],
     "lto thin, 1 unit": ["lto='thin'", "package.jacoflow.codegen-units=1"],
 }
@@ -58,7 +57,6 @@ def compiled(name: str, scratch: Path) -> tuple[float, float]:
     target, into, seconds = scratch / "target", scratch / name, scratch / "seconds"
     settings = [part for setting in VARIANTS[name] for part in ("--config", f"profile.ci.{setting}")]
     kinds = "rlib,cdylib" if name == "rlib too" else "cdylib"
-    settings += ["--no-default-features"] if name == "without AVX-512" else []
     wrapper = scratch / "wrapper"
     wrapper.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{Path(__file__).resolve()}" --compiler "$@"\n')
     wrapper.chmod(0o755)

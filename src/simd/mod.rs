@@ -48,11 +48,10 @@ impl Level {
         None
     }
 
-    /// AVX-512 (F, DQ, VL), if the processor has it and the feature `avx512` is on.
+    /// AVX-512 (F, DQ, VL), if the processor has it.
     pub fn avx512() -> Option<Self> {
         #[cfg(target_arch = "x86_64")]
-        if cfg!(feature = "avx512")
-            && Self::avx2().is_some()
+        if Self::avx2().is_some()
             && std::is_x86_feature_detected!("avx512f")
             && std::is_x86_feature_detected!("avx512dq")
             && std::is_x86_feature_detected!("avx512vl")
@@ -138,15 +137,16 @@ pub(crate) trait Kernel<T: SimdReal> {
 
 /// Runs `kernel` with the widest lanes that `level` allows.
 #[inline]
-#[allow(clippy::match_wildcard_for_single_variants)] // There are more without the feature `avx512`.
 pub(crate) fn dispatch<T: SimdReal, K: Kernel<T>>(level: Level, kernel: K) -> K::Output {
     match level.0 {
+        Inner::Scalar => kernel.run::<T>(),
         // SAFETY: a `Level` of this kind exists only on a processor with AVX2 and FMA.
         #[cfg(target_arch = "x86_64")]
         Inner::Avx2 => unsafe { run_avx2(kernel) },
         // SAFETY: a `Level` of this kind exists only on a processor with AVX-512 F, DQ and VL.
-        #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+        #[cfg(target_arch = "x86_64")]
         Inner::Avx512 => unsafe { run_avx512(kernel) },
+        #[cfg(not(target_arch = "x86_64"))]
         _ => kernel.run::<T>(),
     }
 }
@@ -157,7 +157,7 @@ fn run_avx2<T: SimdReal, K: Kernel<T>>(kernel: K) -> K::Output {
     kernel.run::<T::Avx2>()
 }
 
-#[cfg(all(target_arch = "x86_64", feature = "avx512"))]
+#[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
 fn run_avx512<T: SimdReal, K: Kernel<T>>(kernel: K) -> K::Output {
     kernel.run::<T::Avx512>()
