@@ -89,9 +89,9 @@ typing: packages
 examples: install
 	@for file in examples/*.py; do [ -e "$$file" ] || continue; echo "$$file"; $(BIN)/python "$$file" >/dev/null || exit 1; done
 
-# A quick build for work on the binding: development profile, installed in place.
+# A quick build for work on the binding: the profile of single tests, installed in place.
 develop: $(BIN)/maturin
-	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --extras test
+	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --profile test --extras test
 
 # Ours, as a user would get it, and OpenCV and filterpy in one process; writes a dated table. DATA names a folder of recorded sequences, if there is one.
 compare: CI := --release

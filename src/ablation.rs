@@ -10,7 +10,6 @@
 pub const HEURISTICS: &[(&str, &str)] = &[
     ("motion3d.single_noise", "of few points one motion in larger noise is compared with a selection"),
     ("motion3d.second_motion", "the rejected points are searched for a motion of their own"),
-    ("motion3d.depth_gate", "points with unlikely depths are left out before the last fit"),
     ("motion3d.many_outliers", "among many outliers candidates are refined with outlier posteriors"),
     ("motion3d.outlier_mixture", "the last step weighs points by their outlier posterior"),
     ("motion3d.larger_noise", "noise of the inliers that exceeds the given one inflates the covariance"),
@@ -22,6 +21,8 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("flow.brightness_change", "gain and offset between frames are measured and removed"),
     ("flow.weighted_median", "beside motion boundaries a weighted median of the flow is tried"),
     ("flow.boundary_error", "jumps of the motion nearby widen the covariance"),
+    ("flow.detail_bias", "motion that the finest detail of the frames contradicts over wide windows is moved"),
+    ("flow.detail_scatter", "differences with and without the finest detail widen the covariance"),
     ("flow.block_matches", "blocks are searched for on a coarse level"),
     ("flow.robust_peak_locking", "patches that scatter have little weight in peak locking"),
     ("edges.contrast", "gain between the cameras is estimated and taken out"),

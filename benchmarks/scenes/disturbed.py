@@ -1,5 +1,5 @@
 """What real recordings bring, on textures with exact flow: frames that are not equally bright, saturated pixels,
-motions of a quarter of the frame."""
+motions of a quarter of the frame, detail that pixels do not resolve."""
 
 from __future__ import annotations
 
@@ -113,3 +113,24 @@ def layered(seed: int) -> tuple[list[Array], Array, Array]:
     flow = np.where(on_disc[..., None], move, 0.0)
     near = (np.abs(distance(0)) < 10) & (on_disc | (distance(1) > 0.5)) & (np.abs(distance(0)) > 1)
     return [frame(0), frame(1)], flow, near
+
+
+WAVES = 400
+"""Plane waves of an undersampled texture."""
+CYCLES = 0.65
+"""Their largest wave number, cycles per px: more than pixels resolve."""
+
+
+def undersampled(seed: int, shift: tuple[float, float], side: int = 160) -> list[Array]:
+    """Two frames of faint texture, two fifths of whose spectrum are beyond half a cycle per px; 8 bits."""
+    rng = np.random.default_rng(seed)
+    radius, angle = CYCLES * np.sqrt(rng.uniform(size=WAVES)), rng.uniform(0, 2 * np.pi, WAVES)
+    waves = 2 * np.pi * radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    phase, amplitude = rng.uniform(0, 2 * np.pi, WAVES), rng.standard_normal(WAVES)
+    y, x = np.indices((side, side)).astype(float)
+
+    def frame(u: float, v: float) -> Array:
+        terms = (a * np.cos(kx * (x - u) + ky * (y - v) + p) for (kx, ky), p, a in zip(waves, phase, amplitude, strict=True))
+        return np.rint(60 + 6 * sum(terms, np.zeros_like(x)) / np.sqrt(WAVES / 2))
+
+    return [frame(0, 0), frame(*shift)]

@@ -2,6 +2,7 @@
 
 mod prefilter;
 
+use crate::parallel::for_each_band;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::Frame;
 
@@ -9,6 +10,10 @@ use crate::types::Frame;
 const BEFORE: usize = 1;
 /// Coefficients before and after together: the last pixel's taps reach two further.
 const MARGIN: usize = BEFORE + 2;
+
+/// Weights of the smoothing filter, of a standard deviation of 1 px.
+const BINOMIAL: [f64; 2 * REACH + 1] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
+const REACH: usize = 2;
 
 /// The cubic spline through the samples of a frame, which it continues by mirroring at the outermost pixel
 /// centres (M. Unser, "Splines: a perfect fit for signal and image processing", 1999).
@@ -51,6 +56,25 @@ impl<T: SimdReal> Spline<T> {
             self.coefficients.resize(rows * self.stride, T::from_f64(0.0));
         }
         prefilter::prefilter(level, frame, self.stride, &mut self.coefficients);
+    }
+
+    /// Writes the spline of the frame smoothed by [`BINOMIAL`] along both axes to `out`, in the same memory when it
+    /// is of the same size.
+    pub(crate) fn smoothed_into(&self, level: Level, out: &mut Self) {
+        if out.size() != self.size() {
+            *out = self.clone();
+        }
+        let rows = self.coefficients.len().checked_div(self.stride).unwrap_or(0);
+        for_each_band(&mut out.coefficients, self.stride, |_, band, out| {
+            let mut column = vec![T::from_f64(0.0); self.stride + 2 * REACH];
+            for (y, out) in band.zip(out.chunks_exact_mut(self.stride)) {
+                let around: [&[T]; 2 * REACH + 1] = std::array::from_fn(|k| {
+                    let row = (y + k).saturating_sub(REACH).min(rows - 1);
+                    &self.coefficients[row * self.stride..][..self.stride]
+                });
+                dispatch(level, SmoothRow { around, column: &mut column, out });
+            }
+        });
     }
 
     /// `(width, height)` of the frame.
@@ -131,6 +155,38 @@ fn weights<V: Lanes>(f: V) -> [V; 4] {
     ]
 }
 
+/// One row of a smoothed spline's coefficients, the outermost repeated.
+struct SmoothRow<'a, T> {
+    around: [&'a [T]; 2 * REACH + 1],
+    /// Scratch memory: the row smoothed down the columns, with its margins.
+    column: &'a mut [T],
+    out: &'a mut [T],
+}
+
+impl<T: SimdReal> Kernel<T> for SmoothRow<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { around: [a, b, c, d, e], column, out } = self;
+        let n = out.len();
+        let [outer, inner, centre] = [0, 1, 2].map(|k| T::from_f64(BINOMIAL[k]));
+        let (a, b, c, d, e) = (&a[..n], &b[..n], &c[..n], &d[..n], &e[..n]);
+        let middle = &mut column[REACH..REACH + n];
+        for i in 0..n {
+            middle[i] = outer * (a[i] + e[i]) + inner * (b[i] + d[i]) + centre * c[i];
+        }
+        let (first, last) = (middle[0], middle[n - 1]);
+        column[..REACH].fill(first);
+        column[REACH + n..].fill(last);
+        let column = &column[..n + 2 * REACH];
+        for i in 0..n {
+            out[i] =
+                outer * (column[i] + column[i + 4]) + inner * (column[i + 1] + column[i + 3]) + centre * column[i + 2];
+        }
+    }
+}
+
 struct SampleRow<'a, T> {
     spline: &'a Spline<T>,
     x: &'a [T],
@@ -144,5 +200,25 @@ impl<T: SimdReal> Kernel<T> for SampleRow<'_, T> {
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
         self.spline.sample_row_in::<V>(self.x, self.y, self.out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn smoothed_spline_meets_smoothed_samples() {
+        let simd = Level::detect();
+        let frame = Frame::<f64>::from_fn(23, 17, |x, y| ((x * x + 7 * y) as f64 * 0.37).sin());
+        let mut smoothed = Spline::default();
+        Spline::new(simd, &frame).smoothed_into(simd, &mut smoothed);
+        for (x, y) in (6..17).flat_map(|x| (6..11).map(move |y| (x, y))) {
+            let near = |k: usize| (0..=2 * REACH).map(move |i| (k + i - REACH, BINOMIAL[i]));
+            let rows = near(y).map(|(j, down)| down * near(x).map(|(i, w)| w * frame.get(i, j)).sum::<f64>());
+            let mut found = [0.0];
+            smoothed.sample_row(simd, &[x as f64], &[y as f64], &mut found);
+            assert!((found[0] - rows.sum::<f64>()).abs() < 1e-12, "{x} {y}");
+        }
     }
 }

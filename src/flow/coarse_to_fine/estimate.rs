@@ -1,6 +1,7 @@
 //! What the stages leave for covariance and output.
 
 use super::brightness_scale::BrightnessScale;
+use super::detail_bias::DetailBias;
 use super::peak_locking::PeakLocking;
 use super::planes::Planes;
 use super::refine::WindowStatistics;
@@ -24,6 +25,8 @@ pub(super) struct Estimate<T> {
     pub statistics: Option<WindowStatistics<T>>,
     /// The same for the difference of a triple's next step from its mean step.
     pub acceleration: Option<WindowStatistics<T>>,
+    /// What the finest detail of the frames says differently; `None` if it was not needed.
+    pub detail: Option<DetailBias>,
     /// Peak locking before it was removed.
     pub locking: PeakLocking,
     /// Motion on each coarser level, the finest first; empty without covariance.

@@ -4,6 +4,7 @@ use super::acceleration::to_middle_frame;
 use super::brightness_change::{equalize_along, equalize_roughly};
 use super::brightness_scale::BrightnessScale;
 use super::descent::{DescentPlan, DescentResult};
+use super::detail_bias::DetailBias;
 use super::estimate::Estimate;
 use super::options::CoarseToFineOptions;
 use super::output;
@@ -12,6 +13,7 @@ use super::pyramid::ComparedFrames;
 use super::refine::{RefineOptions, WindowStatistics, refine};
 use super::schedule::Schedule;
 use super::workspace::{Workspace, WorkspaceStore};
+use crate::ablation::keeps;
 use crate::error::Result;
 use crate::flow::options::EstimatorOptions;
 use crate::simd::SimdReal;
@@ -134,6 +136,11 @@ fn estimate<T: SimdReal>(
         residual_std,
     );
     locking.correct(simd, &mut motion);
+    let corrects = plan.finest == 0 && keeps("flow.detail_bias");
+    let detail = (corrects || plan.keeps_levels).then(|| DetailBias::measure(plan, workspace, &motion, residual_std));
+    if let Some(detail) = detail.as_ref().filter(|_| corrects) {
+        detail.correct(&mut motion);
+    }
     let mut acceleration = None;
     if is_triple {
         locking.correct(simd, &mut regularized);
@@ -149,6 +156,7 @@ fn estimate<T: SimdReal>(
         noise_gain: 1.0,
         statistics,
         acceleration,
+        detail,
         locking,
         coarser_motions,
     }

@@ -9,14 +9,14 @@
 //!    windowed normal equations (rows 1 to 3 of WO2010/098160, (21)) at every second pixel; [`regularize`]
 //!    minimises data and robust smoothness terms together. [`resample`] carries the motion to the next level.
 //!    3. [`refine`]: on the finest level, chooses at each site the window over which the motion is averaged;
-//!    three frames are warped by the result and refined once more. 4. [`peak_locking`]: measures and removes
-//!    the bias of undersampled texture. 5. [`acceleration`]: three frames only; from the mean of both steps
-//!    to the step after the middle frame. 6. [`covariance`]: error sources measured in the same frames. 7.
-//!    [`output`]: the field at the requested sites, with status and diagnostics.
+//!    three frames are warped by the result and refined once more. 4. [`peak_locking`], [`detail_bias`]:
+//!    measure and remove the bias of undersampled texture. 5. [`acceleration`]: three frames only; from the
+//!    mean of both steps to the step after the middle frame. 6. [`covariance`]: error sources measured in the
+//!    same frames. 7. [`output`]: the field at the requested sites, with status and diagnostics.
 //!
 //! [`estimator`] runs the stages, [`schedule`] says how much work each level gets, [`estimate`] is what the
 //! stages leave for covariance and output. [`planes`], [`extended`], [`plane_pool`] and [`workspace`] hold
-//! the memory.
+//! the memory; [`nodes`] are where errors are described.
 //!
 //! Flow of a pair belongs to the pixels of the first frame. Every usable pixel gets an estimate; untextured
 //! areas and pixels that leave the frame are filled from their surroundings. Fine random texture that moves
@@ -30,9 +30,11 @@ mod brightness_scale;
 mod covariance;
 mod data_term;
 mod descent;
+mod detail_bias;
 mod estimate;
 mod estimator;
 mod extended;
+mod nodes;
 mod options;
 mod output;
 mod peak_locking;

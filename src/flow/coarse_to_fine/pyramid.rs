@@ -38,8 +38,13 @@ pub(super) struct PyramidLevel<T> {
 impl<T: SimdReal> PyramidLevel<T> {
     /// Two or three frames as input of the data term.
     pub fn views(&self, compared: ComparedFrames) -> Vec<View<'_, T>> {
+        self.views_of(&self.splines, compared)
+    }
+
+    /// As [`PyramidLevel::views`], of other splines of the frames.
+    pub fn views_of<'a>(&'a self, splines: &'a [Spline<T>], compared: ComparedFrames) -> Vec<View<'a, T>> {
         let usable = |k: usize| self.usable[k].as_ref();
-        match (self.splines.as_slice(), compared) {
+        match (splines, compared) {
             ([_, b, c, ..], ComparedFrames::Ahead) => View::ahead([b, c], [usable(1), usable(2)]).to_vec(),
             ([a, b], _) => View::pair([a, b], [usable(0), usable(1)]).to_vec(),
             ([a, b, c, ..], _) => View::triple([a, b, c], [usable(0), usable(1), usable(2)]).to_vec(),

@@ -4,6 +4,7 @@ use super::data_term::Pool;
 use super::plane_pool::{PlanePool, lock};
 use super::pyramid::Pyramid;
 use super::regularize::RegularizeScratch;
+use crate::image::Spline;
 use crate::parallel::PerProcess;
 use crate::simd::SimdReal;
 use std::any::Any;
@@ -14,6 +15,8 @@ pub(super) struct Workspace<T> {
     /// Size of the frames, px.
     size: (usize, usize),
     pub pyramid: Pyramid<T>,
+    /// The finest level's frames, smoothed.
+    pub smoothed: Vec<Spline<T>>,
     pub pool: Pool<T>,
     pub scratch: RegularizeScratch<T>,
     pub space: PlanePool<T>,
@@ -21,7 +24,8 @@ pub(super) struct Workspace<T> {
 
 impl<T: SimdReal> Workspace<T> {
     fn bytes(&self) -> usize {
-        (self.pyramid.samples() + self.space.room()) * size_of::<T>()
+        let smoothed = self.smoothed.len() * self.size.0 * self.size.1;
+        (self.pyramid.samples() + smoothed + self.space.room()) * size_of::<T>()
     }
 }
 

@@ -132,10 +132,8 @@ fn score_deviation(share: Matrix5, pull: &Vector5, variance: f64) -> f64 {
 /// Neighbours that decide with a point which motion it has: moving objects are connected.
 const NEAREST: usize = 8;
 
-/// Times that points are given to the motion that they fit, and that both are searched again from all
-/// directions.
+/// Times that points are given to the motion that they fit.
 const ROUNDS: usize = 8;
-const SEARCHES: usize = 3;
 
 /// Two motions, that of more points first, and what each point leaves with its own, summed.
 #[derive(Debug, Clone, Copy)]
@@ -171,14 +169,15 @@ impl Division {
                 if members.n <= UNKNOWNS.max(NEAREST) {
                     return None;
                 }
-                *motion = if round < SEARCHES {
+                // From all directions at first.
+                *motion = if round == 0 {
                     robust_motions(&members, 1, rng).pop()?
                 } else {
                     refine(&members, *motion, StoppingCriteria::ROUGH).motion
                 };
             }
             let next = self.nearer(&motions);
-            if next == second && round >= SEARCHES {
+            if next == second && round > 0 {
                 break;
             }
             second = next;

@@ -4,8 +4,7 @@
 //! spread over a strip. The squared jump, times the share of sites on the wrong side, is added along its own
 //! direction.
 
-use super::binomial_mean;
-use crate::flow::coarse_to_fine::{planes::Planes, planes::SITE_SPACING, refine::SITES_PER_NODE};
+use crate::flow::coarse_to_fine::{nodes::binomial_mean, planes::Planes, planes::SITE_SPACING, refine::SITES_PER_NODE};
 use crate::simd::SimdReal;
 use rayon::prelude::*;
 

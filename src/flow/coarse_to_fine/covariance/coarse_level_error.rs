@@ -5,8 +5,9 @@
 //! mean absolute values, as for Gaussian errors, so that motion boundaries do not dominate. Refinement
 //! windows carry such errors out of those areas; where errors grow, slopes err by the rise.
 
-use super::{binomial_mean, constrained_directions::ConstrainedDirections};
+use super::constrained_directions::ConstrainedDirections;
 use crate::flow::coarse_to_fine::data_term::MOTION;
+use crate::flow::coarse_to_fine::nodes::binomial_mean;
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;
 use crate::simd::SimdReal;

@@ -9,8 +9,9 @@
 //! measured with a Gaussian of [`FIXED_SIGMA`]. The chosen windows differ, so the motion loses `(1 - G)^4`,
 //! as it does in them, to Gaussians that are somewhat wider, with the weights of the windows.
 
-use super::{Entries, NODES_PER_TASK, binomial_mean};
+use super::{Entries, NODES_PER_TASK};
 use crate::flow::coarse_to_fine::data_term::MOTION;
+use crate::flow::coarse_to_fine::nodes::binomial_mean;
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, TERMS, WindowStatistics};
 use crate::flow::symmetric::{ENTRIES, upper};

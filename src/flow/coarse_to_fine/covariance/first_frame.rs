@@ -3,7 +3,8 @@
 //! The motion `m` at `p + u / 2` becomes that of the pixel `p` by `u_1 = u(p + u_1 / 2)` and `M_1 = N M` with
 //! `N = (I - M / 2)^-1`. To first order errors become `N du` and `N dM N`.
 
-use super::{Entries, NODES_PER_TASK, map::NodeAxis};
+use super::{Entries, NODES_PER_TASK};
+use crate::flow::coarse_to_fine::nodes::NodeAxis;
 use crate::flow::coarse_to_fine::{planes::Planes, planes::SITE_SPACING, refine::SITES_PER_NODE};
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;

@@ -1,39 +1,10 @@
 //! Covariance at pixels, interpolated from the nodes.
 
 use super::Entries;
-use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
-use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, node_count};
+use crate::flow::coarse_to_fine::nodes::{NODE_SPACING, NodeAxis};
+use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
-
-/// Distance of the nodes, pixels of the estimate's level.
-const NODE_SPACING: usize = SITES_PER_NODE * SITE_SPACING as usize;
-
-/// The nodes along one axis, at equal distances except the last two: the last one is at the last site.
-#[derive(Debug, Default, Clone, Copy)]
-pub(super) struct NodeAxis {
-    pub count: usize,
-    /// Position of the last node, in distances of the others.
-    end: f64,
-}
-
-impl NodeAxis {
-    pub fn of(sites: usize) -> Self {
-        Self { count: node_count(sites), end: (sites - 1) as f64 / SITES_PER_NODE as f64 }
-    }
-
-    /// The nodes around a coordinate and the weight of the second; beyond the last, that one alone.
-    pub fn around(&self, at: f64) -> (usize, usize, f64) {
-        let at = at.clamp(0.0, self.end);
-        let first = (at as usize).min(self.count.saturating_sub(2));
-        let length = self.length(first);
-        (first, (first + 1).min(self.count - 1), if length > 0.0 { (at - first as f64) / length } else { 0.0 })
-    }
-
-    fn length(&self, first: usize) -> f64 {
-        (self.end - first as f64).clamp(0.0, 1.0)
-    }
-}
 
 /// A covariance that is linear between nodes, hence positive definite where theirs is.
 #[derive(Debug, Default)]

@@ -28,7 +28,7 @@ mod first_frame;
 mod map;
 mod noise;
 
-use super::{estimate::Estimate, peak_locking::PeakLocking, planes::Planes};
+use super::{estimate::Estimate, nodes::NodeAxis, peak_locking::PeakLocking, planes::Planes};
 use crate::ablation::keeps;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::simd::SimdReal;
@@ -38,7 +38,6 @@ use constrained_directions::ConstrainedDirections;
 use data_support::DataSupport;
 use extrapolation::Extrapolation;
 pub(super) use map::CovarianceMap;
-use map::NodeAxis;
 pub(super) use noise::Energy;
 use noise::{Noise, RemainingNoise};
 use rayon::prelude::*;
@@ -67,6 +66,11 @@ const ACCELERATION_SHARE: f64 = 0.015;
 const MIN_TEXTURED_SHARE: f64 = 0.02;
 /// Share of the noise variance that the next frames' estimates repeat: texture moves on slowly.
 const REPEATED_NOISE_SHARE: f64 = 0.3;
+
+/// Variance of the flow and of its slopes, px^-2, over the scatter between frames with and without their finest
+/// detail that noise does not explain; and that of noise alone over the variance that it has in the flow.
+const DETAIL_SHARES: [f64; 3] = [3.5, 0.01, 0.01];
+const NOISE_IN_DETAIL: f64 = 0.4;
 
 /// Minimum nodes of a parallel task.
 const NODES_PER_TASK: usize = 1024;
@@ -121,7 +125,8 @@ pub(super) fn covariance<T: SimdReal>(
         let at = (n % width, n / width);
         let motion = curvature_bias::motion_at(&estimate.motion, at);
         let mut noise_part = [0.0; ENTRIES];
-        add_noise(&mut noise_part, &noise.at(at.0, at.1), [FLOW_NOISE_FACTOR[kind], SLOPE_NOISE_FACTOR]);
+        let remaining = noise.at(at.0, at.1);
+        add_noise(&mut noise_part, &remaining, [FLOW_NOISE_FACTOR[kind], SLOPE_NOISE_FACTOR]);
         if let Some(change) = &change {
             add_noise(
                 &mut noise_part,
@@ -132,6 +137,13 @@ pub(super) fn covariance<T: SimdReal>(
         extrapolation.add(node, textured_support.distances(at.0, at.1), statistics.mean_sigmas(at.0, at.1));
         add_coarse_level_error(node, &coarse_errors[n]);
         add_blocks(node, [1.0, boundary_error::SLOPE_SHARE, boundary_error::SLOPE_SHARE], &boundary_errors[n]);
+        if let Some(detail) = estimate.detail.as_ref().filter(|_| keeps("flow.detail_scatter")) {
+            let [sigma, _] = statistics.mean_sigmas(at.0, at.1);
+            let scatter = detail.scatter(n, sigma);
+            let noise = FLOW_NOISE_FACTOR[kind] * remaining.flow * (remaining.density[0] + remaining.density[2]);
+            let beyond_noise = (1.0 - NOISE_IN_DETAIL * noise / (scatter[0] + scatter[2])).max(0.0);
+            add_blocks(node, DETAIL_SHARES.map(|share| share * beyond_noise), &scatter);
+        }
         add_locking(node, &motion, &estimate.locking);
         if !is_pair {
             add_acceleration(node, &motion);
@@ -178,22 +190,6 @@ fn add_blocks(node: &mut Entries, factors: [f64; 3], matrix: &[f64; 3]) {
         for (k, (i, j)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
             node[upper(2 * block + i, 2 * block + j)] += factor * matrix[k];
         }
-    }
-}
-
-fn binomial_mean<const N: usize>(nodes: &mut [[f64; N]], (width, height): (usize, usize)) {
-    let mean = |[a, b, c]: [&[f64; N]; 3]| std::array::from_fn(|k| 0.25 * (a[k] + c[k]) + 0.5 * b[k]);
-    let around = |n: usize, count: usize| [n.saturating_sub(1), n, (n + 1).min(count - 1)];
-    for row in nodes.chunks_exact_mut(width.max(1)) {
-        let old = row.to_vec();
-        for (x, out) in row.iter_mut().enumerate() {
-            *out = mean(around(x, width).map(|x| &old[x]));
-        }
-    }
-    let old = nodes.to_vec();
-    for (n, out) in nodes.iter_mut().enumerate() {
-        let (x, y) = (n % width, n / width);
-        *out = mean(around(y, height).map(|y| &old[y * width + x]));
     }
 }
 

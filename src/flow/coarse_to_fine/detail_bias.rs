@@ -1,0 +1,184 @@
+//! Error by the finest detail of the frames, measured by leaving it out.
+//!
+//! Detail near half a cycle per pixel is recorded with aliases, quantised and noisy, and shows first that
+//! texture does not move as affinely as assumed. So the finest level is linearised twice about the result: as
+//! it is and with frames smoothed by `[1, 4, 6, 4, 1] / 16`. Both normal equations are summed in windows
+//! around the nodes and solved for what remains of the motion. Where they disagree over a wide window, the
+//! finest detail is taken for biased, and the motion moves by the difference. Their mean squared difference
+//! around a node measures errors that residuals do not show, as the scatter of half samples does (P. C.
+//! Mahalanobis's interpenetrating samples, 1946); the covariance includes it.
+
+use super::data_term::{COUNT, DataOptions, DataTerm, ERROR, MOTION, normal, right};
+use super::descent::DescentPlan;
+use super::nodes::{NodeAxis, binomial_mean};
+use super::planes::{LEFT, Planes};
+use super::pyramid::ComparedFrames;
+use super::refine::SITES_PER_NODE;
+use super::workspace::Workspace;
+use crate::math::median;
+use crate::simd::SimdReal;
+use rayon::prelude::*;
+
+/// Binomial means of the sums, so that windows have standard deviations of 3.4, 8.7 and 14.3 px.
+const MEANS: [usize; 3] = [0, 2, 6];
+/// Standard deviations of these windows, px.
+pub(super) const WINDOWS: [f64; 3] = [3.4, 8.7, 14.3];
+/// Information, over residual energy, that smoothness adds.
+const PRIOR: f64 = 0.5;
+/// Maximum difference at a node, px: larger ones are of two motions.
+const MAX_DIFFERENCE: f64 = 0.3;
+/// Bias, px, of which half is removed, and the same as a share of the scatter in the narrow window.
+const DOUBTFUL_BIAS: f64 = 0.02;
+const DOUBTFUL_SHARE: f64 = 0.1;
+/// Standard deviation of white noise in a data term's first row after the frames are smoothed.
+const SMOOTHED_NOISE: f64 = 0.48;
+
+/// Sums of `P_uu, P_uv, P_vv`, of the right sides that the motion leaves, and of the residual energy.
+type NodeSums = [f64; 6];
+/// Entries `xx, xy, yy` of a symmetric matrix.
+type Square = [f64; 3];
+
+/// What the finest detail says differently, at nodes.
+#[derive(Debug)]
+pub(super) struct DetailBias {
+    axes: (NodeAxis, NodeAxis),
+    /// Bias of the flow, px, with the opposite sign.
+    correction: Vec<[f64; 2]>,
+    /// Mean squared differences around the nodes, px^2, in each of the windows.
+    scatter: [Vec<Square>; 3],
+}
+
+impl DetailBias {
+    /// Compares both linearisations about the `motion`; `residual_std` is for the robust weights of the rows.
+    pub fn measure<T: SimdReal>(
+        plan: &DescentPlan,
+        workspace: &mut Workspace<T>,
+        motion: &Planes<T>,
+        residual_std: Option<T>,
+    ) -> Self {
+        let Workspace { pyramid, pool, space, smoothed, .. } = workspace;
+        let level = &pyramid.levels()[plan.finest];
+        smoothed.resize_with(level.splines.len(), Default::default);
+        for (from, to) in level.splines.iter().zip(&mut *smoothed) {
+            from.smoothed_into(plan.simd, to);
+        }
+        let axes = (NodeAxis::of(motion.width), NodeAxis::of(motion.height));
+        let size = (axes.0.count, axes.1.count);
+        let term = DataTerm::new(plan.simd, DataOptions::default(), pool);
+        let mut data = space.planes(motion.width, motion.height, COUNT);
+        let smooth_std = residual_std.map(|std| T::from_f64(SMOOTHED_NOISE * std.to_f64()));
+        let mut sums = [(&level.splines, residual_std), (&*smoothed, smooth_std)].map(|(splines, std)| {
+            term.linearise(level.size, &level.views_of(splines, ComparedFrames::All), motion, std, &mut data);
+            node_sums(&data, motion, size)
+        });
+        space.keep(data);
+        let mut differences = Vec::new();
+        let mut done = 0;
+        let scatter = MEANS.map(|means| {
+            for _ in done..means {
+                sums.iter_mut().for_each(|sums| binomial_mean(sums, size));
+            }
+            done = means;
+            differences = difference(&sums);
+            let mut squares: Vec<Square> = differences
+                .iter()
+                .map(|[u, v]| [u, v].map(|d| d.clamp(-MAX_DIFFERENCE, MAX_DIFFERENCE)))
+                .map(|[u, v]| [u * u, u * v, v * v])
+                .collect();
+            (0..2).for_each(|_| binomial_mean(&mut squares, size));
+            squares
+        });
+        let shrunk = |([u, v], [xx, _, yy]): (&[f64; 2], &Square)| {
+            let square = u * u + v * v;
+            let kept = square / (square + DOUBTFUL_SHARE * (xx + yy) + 2.0 * DOUBTFUL_BIAS.powi(2));
+            [kept * u, kept * v]
+        };
+        let correction = differences.iter().zip(&scatter[0]).map(shrunk).collect();
+        Self { axes, correction, scatter }
+    }
+
+    /// Removes the bias from the motion.
+    pub fn correct<T: SimdReal>(&self, motion: &mut Planes<T>) {
+        let len = motion.row_len();
+        let (width, stride) = (motion.width, motion.stride());
+        let (along, across) = self.axes;
+        let columns: Vec<_> = (0..width).map(|x| along.around(x as f64 / SITES_PER_NODE as f64)).collect();
+        motion.data_mut().par_chunks_mut(len.max(1)).enumerate().for_each(|(y, row)| {
+            let (above, below, down) = across.around(y as f64 / SITES_PER_NODE as f64);
+            for c in 0..2 {
+                let line = |j: usize| move |i: usize| self.correction[j * along.count + i][c];
+                let (upper, lower) = (line(above), line(below));
+                for (x, &(left, right, share)) in columns.iter().enumerate() {
+                    let a = upper(left) + (upper(right) - upper(left)) * share;
+                    let b = lower(left) + (lower(right) - lower(left)) * share;
+                    let at = LEFT + c * stride + x;
+                    row[at] += T::from_f64(a + (b - a) * down);
+                }
+            }
+        });
+    }
+
+    /// Mean squared difference around a node in a window of `sigma` px.
+    pub fn scatter(&self, node: usize, sigma: f64) -> Square {
+        let last = WINDOWS.len() - 2;
+        let k = (0..last).find(|&k| sigma < WINDOWS[k + 1]).unwrap_or(last);
+        let share = ((sigma / WINDOWS[k]).ln() / (WINDOWS[k + 1] / WINDOWS[k]).ln()).clamp(0.0, 1.0);
+        let (narrow, wide) = (self.scatter[k][node], self.scatter[k + 1][node]);
+        std::array::from_fn(|i| narrow[i] + share * (wide[i] - narrow[i]))
+    }
+}
+
+/// Sums in triangular windows around the nodes, row by row; they overlap by half.
+fn node_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, size: (usize, usize)) -> Vec<NodeSums> {
+    let around = |node: usize, sites: usize| {
+        let centre = (SITES_PER_NODE * node).min(sites - 1);
+        let range = (centre + 1).saturating_sub(SITES_PER_NODE)..(centre + SITES_PER_NODE).min(sites);
+        range.map(move |site| (site, (SITES_PER_NODE - site.abs_diff(centre)) as f64))
+    };
+    let add = |sum: &mut NodeSums, weight: f64, part: &NodeSums| {
+        sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += weight * part);
+    };
+    let row = |y: usize| {
+        let sites: Vec<NodeSums> = (0..data.width).map(|x| at_site(data, motion, (x, y))).collect();
+        let node = |n: usize| {
+            let mut sum = NodeSums::default();
+            around(n, data.width).for_each(|(x, weight)| add(&mut sum, weight, &sites[x]));
+            sum
+        };
+        (0..size.0).map(node).collect::<Vec<_>>()
+    };
+    let rows: Vec<Vec<NodeSums>> = (0..data.height).into_par_iter().map(row).collect();
+    let nodes = |n: usize| {
+        let mut sum = NodeSums::default();
+        around(n / size.0, data.height).for_each(|(y, weight)| add(&mut sum, weight, &rows[y][n % size.0]));
+        sum
+    };
+    (0..size.0 * size.1).into_par_iter().map(nodes).collect()
+}
+
+/// Normal equations of one site for the flow that its motion leaves.
+fn at_site<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, (x, y): (usize, usize)) -> NodeSums {
+    let known: [f64; MOTION] = std::array::from_fn(|k| motion.at(k, x, y).to_f64());
+    let at = |k: usize| data.at(k, x, y).to_f64();
+    let left = |c: usize| at(right(c)) - (0..MOTION).map(|k| at(normal(c, k)) * known[k]).sum::<f64>();
+    [at(normal(0, 0)), at(normal(0, 1)), at(normal(1, 1)), left(0), left(1), at(ERROR)]
+}
+
+/// What the second sums say of the flow beyond the first, px.
+fn difference(sums: &[Vec<NodeSums>; 2]) -> Vec<[f64; 2]> {
+    let typical = sums.each_ref().map(|sums| {
+        let mut energies: Vec<f64> = sums.iter().map(|sum| sum[5]).collect();
+        median(&mut energies).unwrap_or(0.0)
+    });
+    let solve = |&[a, b, c, u, v, energy]: &NodeSums, typical: f64| {
+        let prior = PRIOR * (energy + typical);
+        let (a, c) = (a + prior, c + prior);
+        let determinant = a * c - b * b;
+        if determinant > 0.0 { [(c * u - b * v) / determinant, (a * v - b * u) / determinant] } else { [0.0; 2] }
+    };
+    let node = |(fine, smooth): (&NodeSums, &NodeSums)| {
+        let (fine, smooth) = (solve(fine, typical[0]), solve(smooth, typical[1]));
+        [smooth[0] - fine[0], smooth[1] - fine[1]]
+    };
+    sums[0].iter().zip(&sums[1]).map(node).collect()
+}

@@ -1,0 +1,50 @@
+//! Nodes, every fourth site: where errors are described.
+
+use super::planes::SITE_SPACING;
+use super::refine::{SITES_PER_NODE, node_count};
+
+/// Distance of the nodes, pixels of the estimate's level.
+pub(super) const NODE_SPACING: usize = SITES_PER_NODE * SITE_SPACING as usize;
+
+/// The nodes along one axis, at equal distances except the last two: the last one is at the last site.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) struct NodeAxis {
+    pub count: usize,
+    /// Position of the last node, in distances of the others.
+    end: f64,
+}
+
+impl NodeAxis {
+    pub fn of(sites: usize) -> Self {
+        Self { count: node_count(sites), end: (sites - 1) as f64 / SITES_PER_NODE as f64 }
+    }
+
+    /// The nodes around a coordinate and the weight of the second; beyond the last, that one alone.
+    pub fn around(&self, at: f64) -> (usize, usize, f64) {
+        let at = at.clamp(0.0, self.end);
+        let first = (at as usize).min(self.count.saturating_sub(2));
+        let length = self.length(first);
+        (first, (first + 1).min(self.count - 1), if length > 0.0 { (at - first as f64) / length } else { 0.0 })
+    }
+
+    pub fn length(&self, first: usize) -> f64 {
+        (self.end - first as f64).clamp(0.0, 1.0)
+    }
+}
+
+/// Mean of each node and its neighbours with the weights `[1, 2, 1] / 4` along both axes.
+pub(super) fn binomial_mean<const N: usize>(nodes: &mut [[f64; N]], (width, height): (usize, usize)) {
+    let mean = |[a, b, c]: [&[f64; N]; 3]| std::array::from_fn(|k| 0.25 * (a[k] + c[k]) + 0.5 * b[k]);
+    let around = |n: usize, count: usize| [n.saturating_sub(1), n, (n + 1).min(count - 1)];
+    for row in nodes.chunks_exact_mut(width.max(1)) {
+        let old = row.to_vec();
+        for (x, out) in row.iter_mut().enumerate() {
+            *out = mean(around(x, width).map(|x| &old[x]));
+        }
+    }
+    let old = nodes.to_vec();
+    for (n, out) in nodes.iter_mut().enumerate() {
+        let (x, y) = (n % width, n / width);
+        *out = mean(around(y, height).map(|y| &old[y * width + x]));
+    }
+}
