@@ -17,7 +17,7 @@ SEEDS = (41, 42, 43)
 """Of textures that no rule was chosen on."""
 SPECKED = range(41, 53)
 """Seeds with saturated pixels: these bias the whole field in about half of the trials only."""
-FRACTIONS = ((0.25, 0.3), (1.7, -0.35), (-2.4, 0.6))
+FRACTIONS = ((0.25, 0.3), (1.7, -0.35), (-0.6, 1.4))
 """Motions of undersampled texture, px."""
 SHIFTS = ((56, 0), (0, -64), (80, 60))
 

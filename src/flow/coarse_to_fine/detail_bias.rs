@@ -10,7 +10,7 @@
 
 use super::data_term::{COUNT, DataOptions, DataTerm, ERROR, MOTION, normal, right};
 use super::descent::DescentPlan;
-use super::nodes::{NodeAxis, binomial_mean};
+use super::nodes::{NodeAxis, binomial_mean, sites_around};
 use super::planes::{LEFT, Planes};
 use super::pyramid::ComparedFrames;
 use super::refine::SITES_PER_NODE;
@@ -26,7 +26,7 @@ pub(super) const WINDOWS: [f64; 3] = [3.4, 8.7, 14.3];
 /// Information, over residual energy, that smoothness adds.
 const PRIOR: f64 = 0.5;
 /// Maximum difference at a node, px: larger ones are of two motions.
-const MAX_DIFFERENCE: f64 = 0.3;
+const MAX_DIFFERENCE: f64 = 0.1;
 /// Bias, px, of which half is removed, and the same as a share of the scatter in the narrow window.
 const DOUBTFUL_BIAS: f64 = 0.02;
 const DOUBTFUL_SHARE: f64 = 0.1;
@@ -76,7 +76,9 @@ impl DetailBias {
         let mut done = 0;
         let scatter = MEANS.map(|means| {
             for _ in done..means {
-                sums.iter_mut().for_each(|sums| binomial_mean(sums, size));
+                for sums in &mut sums {
+                    binomial_mean(sums, size);
+                }
             }
             done = means;
             differences = difference(&sums);
@@ -85,7 +87,9 @@ impl DetailBias {
                 .map(|[u, v]| [u, v].map(|d| d.clamp(-MAX_DIFFERENCE, MAX_DIFFERENCE)))
                 .map(|[u, v]| [u * u, u * v, v * v])
                 .collect();
-            (0..2).for_each(|_| binomial_mean(&mut squares, size));
+            for _ in 0..2 {
+                binomial_mean(&mut squares, size);
+            }
             squares
         });
         let shrunk = |([u, v], [xx, _, yy]): (&[f64; 2], &Square)| {
@@ -130,11 +134,6 @@ impl DetailBias {
 
 /// Sums in triangular windows around the nodes, row by row; they overlap by half.
 fn node_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, size: (usize, usize)) -> Vec<NodeSums> {
-    let around = |node: usize, sites: usize| {
-        let centre = (SITES_PER_NODE * node).min(sites - 1);
-        let range = (centre + 1).saturating_sub(SITES_PER_NODE)..(centre + SITES_PER_NODE).min(sites);
-        range.map(move |site| (site, (SITES_PER_NODE - site.abs_diff(centre)) as f64))
-    };
     let add = |sum: &mut NodeSums, weight: f64, part: &NodeSums| {
         sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += weight * part);
     };
@@ -142,7 +141,7 @@ fn node_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, size: (usize, us
         let sites: Vec<NodeSums> = (0..data.width).map(|x| at_site(data, motion, (x, y))).collect();
         let node = |n: usize| {
             let mut sum = NodeSums::default();
-            around(n, data.width).for_each(|(x, weight)| add(&mut sum, weight, &sites[x]));
+            sites_around(n, data.width).for_each(|(x, weight)| add(&mut sum, weight, &sites[x]));
             sum
         };
         (0..size.0).map(node).collect::<Vec<_>>()
@@ -150,7 +149,7 @@ fn node_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, size: (usize, us
     let rows: Vec<Vec<NodeSums>> = (0..data.height).into_par_iter().map(row).collect();
     let nodes = |n: usize| {
         let mut sum = NodeSums::default();
-        around(n / size.0, data.height).for_each(|(y, weight)| add(&mut sum, weight, &rows[y][n % size.0]));
+        sites_around(n / size.0, data.height).for_each(|(y, weight)| add(&mut sum, weight, &rows[y][n % size.0]));
         sum
     };
     (0..size.0 * size.1).into_par_iter().map(nodes).collect()

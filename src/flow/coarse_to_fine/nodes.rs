@@ -48,3 +48,10 @@ pub(super) fn binomial_mean<const N: usize>(nodes: &mut [[f64; N]], (width, heig
         *out = mean(around(y, height).map(|y| &old[y * width + x]));
     }
 }
+
+/// Sites around a node along one axis, with the weights of a triangular window; neighbours' overlap by half.
+pub(super) fn sites_around(node: usize, sites: usize) -> impl Iterator<Item = (usize, f64)> {
+    let centre = (SITES_PER_NODE * node).min(sites - 1);
+    let range = (centre + 1).saturating_sub(SITES_PER_NODE)..(centre + SITES_PER_NODE).min(sites);
+    range.map(move |site| (site, (SITES_PER_NODE - site.abs_diff(centre)) as f64))
+}

@@ -81,7 +81,7 @@ impl Schedule {
                 iterations: [3, 5, 5],
                 next_frame_iterations: [2, 5, 5],
                 tolerance: [finest_tolerance, 0.023],
-                smoothness: Smoothness { flow: 30.0, jacobian: 4000.0, sweeps: 4, break_strain: 0.14, ..smoothness },
+                smoothness: Smoothness { sweeps: 4, break_strain: 0.14, ..smoothness },
                 finest_sweeps,
                 finest_sharpened: 1,
                 searches: true,

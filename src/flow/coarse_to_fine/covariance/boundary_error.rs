@@ -4,7 +4,8 @@
 //! spread over a strip. The squared jump, times the share of sites on the wrong side, is added along its own
 //! direction.
 
-use crate::flow::coarse_to_fine::{nodes::binomial_mean, planes::Planes, planes::SITE_SPACING, refine::SITES_PER_NODE};
+use crate::flow::coarse_to_fine::nodes::{binomial_mean, sites_around};
+use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::simd::SimdReal;
 use rayon::prelude::*;
 
@@ -19,16 +20,11 @@ pub(super) const SLOPE_SHARE: f64 = 1.0 / (BOUNDARY_WIDTH * BOUNDARY_WIDTH);
 
 /// Variances `xx, xy, yy` of the flow, px^2, at every node.
 pub(super) fn boundary_errors<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec<[f64; 3]> {
-    let around = |node: usize, sites: usize| {
-        let centre = (SITES_PER_NODE * node).min(sites - 1);
-        let range = (centre + 1).saturating_sub(SITES_PER_NODE)..(centre + SITES_PER_NODE).min(sites);
-        range.map(move |site| (site, (SITES_PER_NODE - site.abs_diff(centre)) as f64))
-    };
     let rows: Vec<Vec<[f64; 3]>> = (0..motion.height).into_par_iter().map(|y| jumps(motion, y)).collect();
     let node = |n: usize| {
         let (mut sum, mut weights) = ([0.0; 3], 0.0);
-        for (y, down) in around(n / width, motion.height) {
-            for (x, along) in around(n % width, motion.width) {
+        for (y, down) in sites_around(n / width, motion.height) {
+            for (x, along) in sites_around(n % width, motion.width) {
                 sum.iter_mut().zip(rows[y][x]).for_each(|(sum, jump)| *sum += down * along * jump);
                 weights += down * along;
             }

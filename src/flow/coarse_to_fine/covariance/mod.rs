@@ -67,9 +67,11 @@ const MIN_TEXTURED_SHARE: f64 = 0.02;
 /// Share of the noise variance that the next frames' estimates repeat: texture moves on slowly.
 const REPEATED_NOISE_SHARE: f64 = 0.3;
 
-/// Variance of the flow and of its slopes, px^-2, over the scatter between frames with and without their finest
-/// detail that noise does not explain; and that of noise alone over the variance that it has in the flow.
-const DETAIL_SHARES: [f64; 3] = [3.5, 0.01, 0.01];
+/// Variance of the flow and of its slopes, px^-2, over the scatter between frames with and without their
+/// finest detail that noise does not explain; and that of noise alone over its variance in the flow.
+const DETAIL_SHARES: [f64; 3] = [2.0, 0.01, 0.01];
+/// Share of these on coarser levels, whose frames are smooth already.
+const COARSE_DETAIL_SHARE: f64 = 0.4;
 const NOISE_IN_DETAIL: f64 = 0.4;
 
 /// Minimum nodes of a parallel task.
@@ -141,7 +143,8 @@ pub(super) fn covariance<T: SimdReal>(
             let [sigma, _] = statistics.mean_sigmas(at.0, at.1);
             let scatter = detail.scatter(n, sigma);
             let noise = FLOW_NOISE_FACTOR[kind] * remaining.flow * (remaining.density[0] + remaining.density[2]);
-            let beyond_noise = (1.0 - NOISE_IN_DETAIL * noise / (scatter[0] + scatter[2])).max(0.0);
+            let of_level = if estimate.level == 0 { 1.0 } else { COARSE_DETAIL_SHARE };
+            let beyond_noise = of_level * (1.0 - NOISE_IN_DETAIL * noise / (scatter[0] + scatter[2])).max(0.0);
             add_blocks(node, DETAIL_SHARES.map(|share| share * beyond_noise), &scatter);
         }
         add_locking(node, &motion, &estimate.locking);
