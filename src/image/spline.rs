@@ -58,8 +58,8 @@ impl<T: SimdReal> Spline<T> {
         prefilter::prefilter(level, frame, self.stride, &mut self.coefficients);
     }
 
-    /// Writes the spline of the frame smoothed by `[1, 4, 6, 4, 1] / 16` along both axes to `out`, in the memory
-    /// it has if it is of the same size.
+    /// Writes the spline of the frame smoothed by `[1, 4, 6, 4, 1] / 16` along both axes to `out`, in the
+    /// memory it has if it is of the same size.
     pub fn smoothed_into(&self, level: Level, out: &mut Self) {
         if out.size() != self.size() {
             *out = self.clone();
