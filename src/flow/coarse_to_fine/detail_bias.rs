@@ -22,7 +22,7 @@ use rayon::prelude::*;
 /// Binomial means of the sums, so that windows have standard deviations of 3.4, 8.7 and 14.3 px.
 const MEANS: [usize; 3] = [0, 2, 6];
 /// Standard deviations of these windows, px.
-pub(super) const WINDOWS: [f64; 3] = [3.4, 8.7, 14.3];
+const WINDOWS: [f64; 3] = [3.4, 8.7, 14.3];
 /// Information, over residual energy, that smoothness adds.
 const PRIOR: f64 = 0.5;
 /// Maximum difference at a node, px: larger ones are of two motions.
@@ -30,7 +30,8 @@ const MAX_DIFFERENCE: f64 = 0.1;
 /// Bias, px, of which half is removed, and the same as a share of the scatter in the narrow window.
 const DOUBTFUL_BIAS: f64 = 0.02;
 const DOUBTFUL_SHARE: f64 = 0.1;
-/// Standard deviation of white noise in a data term's first row after the frames are smoothed.
+/// Standard deviation of white noise in a data term's first row after the frames are smoothed, over that
+/// before.
 const SMOOTHED_NOISE: f64 = 0.48;
 
 /// Sums of `P_uu, P_uv, P_vv`, of the right sides that the motion leaves, and of the residual energy.

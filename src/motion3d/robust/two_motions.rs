@@ -243,6 +243,25 @@ mod tests {
     }
 
     #[test]
+    fn a_part_with_another_rotation_pulls_apart_and_noise_does_not() {
+        let all: Vec<u32> = (0..400).collect();
+        let (mut chance, mut found) = (0, 0);
+        for seed in 0..200 {
+            let mut scene = Scene::oblique(400, 0.02, seed);
+            chance += u32::from(deviating_parts(&scene.observations(), &oblique(), &all).is_some());
+            // Two standard deviations of a point, most of which passes for depth.
+            let turned = Motion::new(oblique().translation, W.map(|w| 2.0 * w));
+            for k in (0..400).filter(|&k| scene.points[k][0] > 0.3) {
+                let (nu, at) = (scene.inverse_depth[k], scene.points[k]);
+                let (before, after) = (oblique().plane_flow(at, nu), turned.plane_flow(at, nu));
+                scene.flow[k] = [0, 1].map(|j| scene.flow[k][j] + after[j] - before[j]);
+            }
+            found += u32::from(deviating_parts(&scene.observations(), &oblique(), &all).is_some());
+        }
+        assert!(chance <= 50 && found >= 190, "{chance} {found}");
+    }
+
+    #[test]
     fn both_motions_are_found_from_a_part_that_is_neither() {
         let object = Motion::new([-0.8, 0.1, 0.3], W.map(|w| 1.5 * w));
         for seed in 0..5 {
