@@ -34,19 +34,17 @@ fn a_handful_of_points_is_no_reason_to_stop() {
 /// A few of few points always agree by chance: where the noise is not known, it must not be theirs.
 #[test]
 fn few_points_do_not_choose_their_own_noise() {
-    for n in [20, 30] {
-        let (mut confident, mut wrong, mut small) = (0, 0, 0);
-        for seed in 0..240 {
-            let scene = Scene::oblique(n, 0.1, seed);
-            let found = estimate_motion(&scene.flow(), &Noise::Unknown, &options()).unwrap();
-            if found.status == Status::Ok {
-                confident += 1;
-                wrong += u32::from(mahalanobis(&found, &scene.motion) > 45.0);
-                small += u32::from(found.noise_std < 0.05);
-            }
+    let (mut confident, mut wrong, mut small) = (0, 0, 0);
+    for seed in 0..240 {
+        let scene = Scene::oblique(20, 0.1, seed);
+        let found = estimate_motion(&scene.flow(), &Noise::Unknown, &options()).unwrap();
+        if found.status == Status::Ok {
+            confident += 1;
+            wrong += u32::from(mahalanobis(&found, &scene.motion) > 45.0);
+            small += u32::from(found.noise_std < 0.05);
         }
-        assert!(confident >= 60 && wrong <= 12 && small <= 4, "{n}: {wrong} and {small} of {confident}");
     }
+    assert!(confident >= 60 && wrong <= 12 && small <= 4, "{wrong} and {small} of {confident}");
     // Outliers that are far out are seen all the same.
     let mut right = 0;
     for seed in 0..20 {
