@@ -122,25 +122,6 @@ fn slow_displacements_are_instantaneous_flow_half_way() {
     assert!(found.motion.angle_to(&instantaneous).to_degrees() < 0.01 * found.direction_std);
 }
 
-#[test]
-fn covariances_of_fast_turns_hold() {
-    for (robust, share) in [(false, 0.0), (true, 0.3)] {
-        let (mut held, mut ok) = (0, 0);
-        for seed in 0..60 {
-            let truth = rotating(seed as usize % 4, 0.12 + 0.13 * (seed % 3) as f64 / 2.0);
-            let seen = views(&truth, 400, seed, |_, r| 0.02 * (0.5 + r)).noisy(4e-4, 100 + seed);
-            let seen = seen.with_outliers(share, 200 + seed);
-            let found =
-                seen.run(&Noise::StandardDeviation(4e-4), &MotionOptions { robust, ..MotionOptions::default() });
-            if found.status == Status::Ok {
-                ok += 1;
-                held += u32::from(mahalanobis(&found, &truth) < ELLIPSOID);
-            }
-        }
-        assert!(ok >= 54 && f64::from(held) >= 0.88 * f64::from(ok), "{robust}: {held} of {ok}");
-    }
-}
-
 /// Points on one line of the picture determine the motion; a turn of a radian past near points fits them
 /// nearly as well, with most of the noise hidden in depths that change by as much as they are.
 #[test]
