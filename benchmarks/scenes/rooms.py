@@ -4,6 +4,7 @@ moves between two frames."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,15 +87,23 @@ def _wall(rng: np.random.Generator) -> Array:
     return np.asarray(spline_filter(128 + 40 * (grey - grey.mean()) / grey.std(), order=3, mode="mirror"))
 
 
-def room(seed: int, step: float = 0.02, turn: float = 0.006) -> Room:
-    """A room of chance, half sides 1.2 to 3; the camera moves by `step` in any direction and turns by up
-    to `turn` rad."""
+@lru_cache(maxsize=1)
+def _at_rest(seed: int) -> tuple[list[Array], Array, Array, Array, Array, float]:
+    """Walls, pose, half sides, direction of the camera, the axis that it turns about and by which share of
+    the most: walls take long, and several motions in a row are seen in one room."""
     rng = np.random.default_rng((seed, 31))
     walls = [_wall(rng) for _ in WALLS]
     pose = Rotation.from_rotvec(0.4 * rng.normal(size=3)).as_matrix()
     u, axis = (vector / np.linalg.norm(vector) for vector in rng.normal(size=(2, 3)))
-    w = axis * rng.uniform(0, turn)
-    extent = rng.uniform(1.2, 3, 3)
+    share = rng.random()
+    return walls, pose, rng.uniform(1.2, 3, 3), u, axis, share
+
+
+def room(seed: int, step: float = 0.02, turn: float = 0.006) -> Room:
+    """A room of chance, half sides 1.2 to 3; the camera moves by `step` in any direction and turns by up
+    to `turn` rad."""
+    walls, pose, extent, u, axis, share = _at_rest(seed)
+    w = axis * (turn * share)
     # The steady motion over the frame: its shift is the mean of those that the rotation turns on.
     steps = Rotation.from_rotvec((np.arange(64)[:, None] + 0.5) / 64 * w).as_matrix()
     return Room(pose, extent, walls, u, w, Rotation.from_rotvec(w).as_matrix(), step * steps.mean(axis=0) @ u)

@@ -37,15 +37,17 @@ WAYS: dict[str, dict[str, Any]] = {
 }
 
 
+def field(method: Method, noise: float, step: float, seed: int) -> tuple[jacoflow.FlowField, rooms.Room]:
+    """The flow field of a room, and this."""
+    made = rooms.room(seed, step, TURN * step)
+    return jacoflow.estimate(rooms.frames(made, noise, seed), method=method), made
+
+
 def fields(
     method: Method, noise: float, step: float, trials: int
 ) -> list[tuple[jacoflow.FlowField, rooms.Room]]:
     """Flow fields of rooms, and these."""
-    made = [rooms.room(seed, step, TURN * step) for seed in range(trials)]
-    return [
-        (jacoflow.estimate(rooms.frames(one, noise, seed), method=method), one)
-        for seed, one in enumerate(made)
-    ]
+    return [field(method, noise, step, seed) for seed in range(trials)]
 
 
 def estimated(seen: list[tuple[jacoflow.FlowField, rooms.Room]], way: str) -> Iterator[Estimated]:

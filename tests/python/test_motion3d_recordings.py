@@ -32,21 +32,25 @@ def test_halves_of_the_picture_differ_by_what_their_covariances_say():
     assert np.mean([row["mean, taken for independent"] for row in rows]) > 2, rows
 
 
-@pytest.mark.skipif(not (DATA / "ttc_kitti_lidar").is_dir(), reason="no recordings")
-def test_time_to_contact_agrees_with_the_laser():
-    rows = motion3d_car.car(DATA)
-    trusted = [row for row in rows if row["status"] != "ill_conditioned"]
+@pytest.fixture(scope="module")
+def cars():
+    if not (DATA / "ttc_kitti_lidar").is_dir():
+        pytest.skip("no recordings")
+    return motion3d_car.car(DATA)
+
+
+def test_time_to_contact_agrees_with_the_laser(cars):
+    trusted = [row for row in cars if row["status"] != "ill_conditioned"]
     assert len(trusted) >= 10
     off = np.array([row["off these frames, deviations"] for row in trusted], float)
-    assert np.abs(off).max() < 2 and np.sqrt(np.mean(off**2)) < 1.2, rows
+    assert np.abs(off).max() < 2 and np.sqrt(np.mean(off**2)) < 1.2, cars
     # The speeds in the file are too high where the range jumps before the first frame.
-    assert np.median(np.abs([float(str(row["off the file, deviations"])) for row in rows])) < 1.5
+    assert np.median(np.abs([float(str(row["off the file, deviations"])) for row in cars])) < 1.5
 
 
-@pytest.mark.skipif(not (DATA / "ttc_kitti_lidar").is_dir(), reason="no recordings")
-def test_the_whole_scene_moves_straight_ahead_or_it_is_reported():
+def test_the_whole_scene_moves_straight_ahead_or_it_is_reported(cars):
     """A tank lorry overtakes on a quarter of the picture: together with the other side it would fit a sideways motion."""
-    for row in motion3d_car.car(DATA):
+    for row in cars:
         straight = float(str(row["scene off straight ahead, deg"])) < 3
         assert straight or row["scene's status"] != "ok", row
         assert straight, row
