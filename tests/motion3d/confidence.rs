@@ -65,18 +65,6 @@ fn the_opposite_motion_is_reported_where_depths_do_not_exclude_it() {
     }
 }
 
-/// The residuals that show other directions are maximum likelihood's, on a sample of the points.
-#[test]
-fn many_points_are_no_reason_for_doubt() {
-    let mut trusted = 0;
-    for seed in 0..12 {
-        let scene = Scene::new(oblique(), 8000, 0.6, 0.2, seed, |x, y, _| smooth(x, y));
-        let found = scene.run(&MotionOptions::default());
-        trusted += u32::from(found.status != Status::IllConditioned);
-    }
-    assert!(trusted >= 11, "{trusted} of 12");
-}
-
 /// With noisy depths the deviation of a thousand points grows faster than by the root of their number: what
 /// they leave in doubt is tested on more.
 #[test]

@@ -1,6 +1,6 @@
 //! Maximum likelihood requested by name: as doubtful as the smoothed weights, and honest about what it lacks.
 
-use super::scenes::{Held, Scene, W, ground, oblique, smooth};
+use super::scenes::{Held, Scene, W, ground, smooth};
 use jacoflow::math::random::CounterRng;
 use jacoflow::motion3d::*;
 
@@ -23,18 +23,17 @@ fn maximum_likelihood_reports_other_minima_too() {
     assert!(undecided >= 8 && sure <= 2, "{sure} of {undecided}");
 }
 
-/// By name, maximum likelihood's own theory holds while the noise of the depths matters little; where the
-/// epipole may lie among noisy points its distance from the better solution is reported.
+/// Where the epipole may lie among noisy points maximum likelihood's own theory promises too small errors;
+/// its distance from the better solution is reported.
 #[test]
 fn maximum_likelihood_shows_how_far_it_may_be() {
     let ground = |_: f64, y: f64, _: f64| ground(y);
     let options = MotionOptions { method: Method::MaximumLikelihood, ..MotionOptions::default() };
     type Depth<'a> = &'a dyn Fn(f64, f64, f64) -> f64;
-    let cases: [(Motion, usize, f64, Depth<'_>); 4] = [
+    let cases: [(Motion, usize, f64, Depth<'_>); 3] = [
         (Motion::new([0.35, 0.25, 1.0], W), 1000, 0.15, &ground),
         (Motion::new([0.05, -0.03, 1.0], W), 500, 0.1, &ground),
         (Motion::new([0.05, -0.03, 1.0], W), 300, 0.05, &|x, y, _| smooth(x, y)),
-        (oblique(), 500, 0.1, &|_, _, r| 0.5 + r),
     ];
     for (case, (motion, n, noise_std, depth)) in cases.into_iter().enumerate() {
         let (mut told, mut by_theory) = (Held::default(), Held::default());
@@ -52,7 +51,6 @@ fn maximum_likelihood_shows_how_far_it_may_be() {
             }
         }
         assert!(told.of >= 50 && told.share() >= 0.88, "{case}: {told:?}");
-        // The last case is what theory is made for.
-        assert!(if case < 3 { by_theory.share() < 0.8 } else { by_theory.share() >= 0.88 }, "{case}: {by_theory:?}");
+        assert!(by_theory.share() < 0.8, "{case}: {by_theory:?}");
     }
 }

