@@ -58,14 +58,16 @@ impl<T: SimdReal> Spline<T> {
         prefilter::prefilter(level, frame, self.stride, &mut self.coefficients);
     }
 
-    /// Writes the spline of the frame smoothed by `[1, 4, 6, 4, 1] / 16` along both axes to `out`, in the
-    /// memory it has if it is of the same size.
-    pub fn smoothed_into(&self, level: Level, out: &mut Self) {
-        if out.size() != self.size() {
-            *out = self.clone();
-        }
-        let rows = self.coefficients.len().checked_div(self.stride).unwrap_or(0);
-        for_each_band(&mut out.coefficients, self.stride, |_, band, out| {
+    /// Number of values that it holds in memory.
+    pub fn values(&self) -> usize {
+        self.coefficients.len()
+    }
+
+    /// The spline of the frame smoothed by `[1, 4, 6, 4, 1] / 16` along both axes, in `memory` of
+    /// at least [`Spline::values`].
+    pub fn smoothed(&self, level: Level, mut memory: Vec<T>) -> Self {
+        let rows = self.values().checked_div(self.stride).unwrap_or(0);
+        for_each_band(&mut memory[..self.values()], self.stride, |_, band, out| {
             let mut column = vec![T::from_f64(0.0); self.stride + 2 * REACH];
             for (y, out) in band.zip(out.chunks_exact_mut(self.stride)) {
                 let around: [&[T]; 2 * REACH + 1] = std::array::from_fn(|k| {
@@ -75,6 +77,12 @@ impl<T: SimdReal> Spline<T> {
                 dispatch(level, SmoothRow { around, column: &mut column, out });
             }
         });
+        Self { coefficients: memory, ..*self }
+    }
+
+    /// Its memory, for another.
+    pub fn into_memory(self) -> Vec<T> {
+        self.coefficients
     }
 
     /// `(width, height)` of the frame.
@@ -211,8 +219,8 @@ mod tests {
     fn smoothed_spline_meets_smoothed_samples() {
         let simd = Level::detect();
         let frame = Frame::<f64>::from_fn(23, 17, |x, y| ((x * x + 7 * y) as f64 * 0.37).sin());
-        let mut smoothed = Spline::default();
-        Spline::new(simd, &frame).smoothed_into(simd, &mut smoothed);
+        let spline = Spline::new(simd, &frame);
+        let smoothed = spline.smoothed(simd, vec![0.0; spline.values() + 5]);
         for (x, y) in (6..17).flat_map(|x| (6..11).map(move |y| (x, y))) {
             let near = |k: usize| (0..=2 * REACH).map(move |i| (k + i - REACH, BINOMIAL[i]));
             let rows = near(y).map(|(j, down)| down * near(x).map(|(i, w)| w * frame.get(i, j)).sum::<f64>());

@@ -15,6 +15,7 @@ use super::planes::{LEFT, Planes};
 use super::pyramid::ComparedFrames;
 use super::refine::SITES_PER_NODE;
 use super::workspace::Workspace;
+use crate::image::Spline;
 use crate::math::median;
 use crate::simd::SimdReal;
 use rayon::prelude::*;
@@ -57,21 +58,20 @@ impl DetailBias {
         motion: &Planes<T>,
         residual_std: Option<T>,
     ) -> Self {
-        let Workspace { pyramid, pool, space, smoothed, .. } = workspace;
+        let Workspace { pyramid, pool, space, .. } = workspace;
         let level = &pyramid.levels()[plan.finest];
-        smoothed.resize_with(level.splines.len(), Default::default);
-        for (from, to) in level.splines.iter().zip(&mut *smoothed) {
-            from.smoothed_into(plan.simd, to);
-        }
+        let smoothed: Vec<Spline<T>> =
+            level.splines.iter().map(|spline| spline.smoothed(plan.simd, space.samples(spline.values()))).collect();
         let axes = (NodeAxis::of(motion.width), NodeAxis::of(motion.height));
         let size = (axes.0.count, axes.1.count);
         let term = DataTerm::new(plan.simd, DataOptions::default(), pool);
         let mut data = space.planes(motion.width, motion.height, COUNT);
         let smooth_std = residual_std.map(|std| T::from_f64(SMOOTHED_NOISE * std.to_f64()));
-        let mut sums = [(&level.splines, residual_std), (&*smoothed, smooth_std)].map(|(splines, std)| {
+        let mut sums = [(&level.splines, residual_std), (&smoothed, smooth_std)].map(|(splines, std)| {
             term.linearise(level.size, &level.views_of(splines, ComparedFrames::All), motion, std, &mut data);
             node_sums(&data, motion, size)
         });
+        smoothed.into_iter().map(Spline::into_memory).for_each(|memory| space.keep(Planes::of_samples(memory)));
         space.keep(data);
         let mut differences = Vec::new();
         let mut done = 0;

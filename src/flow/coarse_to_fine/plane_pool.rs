@@ -16,15 +16,27 @@ impl<T: SimdReal> PlanePool<T> {
     /// Planes with any finite content: the smallest free ones large enough, but not much larger, since others
     /// need those; or else the largest smaller ones, enlarged.
     pub fn planes(&self, width: usize, height: usize, count: usize) -> Planes<T> {
-        let len = Planes::<T>::len(width, height, count);
+        let mut planes = self.best(Planes::<T>::len(width, height, count));
+        planes.reshape(width, height, count);
+        planes
+    }
+
+    /// At least `len` samples of any finite value, chosen as [`PlanePool::planes`] are.
+    pub fn samples(&self, len: usize) -> Vec<T> {
+        let mut samples = self.best(len).into_samples();
+        if samples.len() < len {
+            samples = vec![T::from_f64(0.0); len];
+        }
+        samples
+    }
+
+    fn best(&self, len: usize) -> Planes<T> {
         let mut free = lock(&self.free);
         let fit =
             |planes: &Planes<T>| if planes.room() < len { (1, usize::MAX - planes.room()) } else { (0, planes.room()) };
         let allowed = (0..free.len()).filter(|&at| free[at].room() as f64 <= MAX_ROOM_RATIO * len as f64);
         let best = allowed.min_by_key(|&at| fit(&free[at]));
-        let mut planes = best.map(|at| free.swap_remove(at)).unwrap_or_default();
-        planes.reshape(width, height, count);
-        planes
+        best.map(|at| free.swap_remove(at)).unwrap_or_default()
     }
 
     pub fn keep(&self, planes: Planes<T>) {

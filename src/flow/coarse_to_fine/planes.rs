@@ -40,6 +40,15 @@ impl<T: SimdReal> Planes<T> {
         }
     }
 
+    /// Planes of no size in the memory of `samples`.
+    pub fn of_samples(samples: Vec<T>) -> Self {
+        Self { data: samples, ..Self::default() }
+    }
+
+    pub fn into_samples(self) -> Vec<T> {
+        self.data
+    }
+
     pub fn copy_from(&mut self, other: &Self) {
         self.reshape(other.width, other.height, other.count);
         self.data_mut().copy_from_slice(other.data());

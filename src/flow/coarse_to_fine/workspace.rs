@@ -4,7 +4,6 @@ use super::data_term::Pool;
 use super::plane_pool::{PlanePool, lock};
 use super::pyramid::Pyramid;
 use super::regularize::RegularizeScratch;
-use crate::image::Spline;
 use crate::parallel::PerProcess;
 use crate::simd::SimdReal;
 use std::any::Any;
@@ -15,8 +14,6 @@ pub(super) struct Workspace<T> {
     /// Size of the frames, px.
     size: (usize, usize),
     pub pyramid: Pyramid<T>,
-    /// The finest level's frames, smoothed.
-    pub smoothed: Vec<Spline<T>>,
     pub pool: Pool<T>,
     pub scratch: RegularizeScratch<T>,
     pub space: PlanePool<T>,
@@ -24,8 +21,7 @@ pub(super) struct Workspace<T> {
 
 impl<T: SimdReal> Workspace<T> {
     fn bytes(&self) -> usize {
-        let smoothed = self.smoothed.len() * self.size.0 * self.size.1;
-        (self.pyramid.samples() + smoothed + self.space.room()) * size_of::<T>()
+        (self.pyramid.samples() + self.space.room()) * size_of::<T>()
     }
 }
 
