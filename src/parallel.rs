@@ -229,14 +229,4 @@ mod tests {
         assert_eq!(*VALUE.get().lock().unwrap(), 0);
         assert_eq!(*held, 3);
     }
-
-    #[test]
-    fn the_environment_is_believed_or_refused_never_ignored() {
-        let of = |text: &str| from_environment(Some(text.into()));
-        assert_eq!((from_environment(None).unwrap(), of("").unwrap(), of("3").unwrap()), (None, None, Some(3)));
-        for wrong in ["abc", "0", "-1", "1.5", " "] {
-            let message = of(wrong).unwrap_err().to_string();
-            assert!(message.starts_with("JACOFLOW_THREADS: ") && message.contains(wrong), "{message}");
-        }
-    }
 }

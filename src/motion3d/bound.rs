@@ -109,31 +109,3 @@ pub(crate) fn check_motion(translation: &[f64; 3], rotation: &[f64; 3]) -> Resul
     refuse_if(!is_direction, "translation", "a finite vector with a direction", numbers(translation))?;
     refuse_if(!is_finite(rotation), "rotation", "a finite vector", numbers(rotation))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::motion3d::kernels::{Weighted, equations, information};
-    use crate::motion3d::lateral_bound;
-
-    /// The direction lies in the image plane once the other unknowns are taken out.
-    #[test]
-    fn the_closed_forms_of_one_unknown_are_the_general_ones() {
-        let depths: Vec<f64> = (0..101).map(|k| 0.5 + f64::from(k) / 100.0).collect();
-        let bound = lateral_bound(&depths, 0.3).unwrap();
-        let at = vec![[0.0; 2]; 101];
-        let flow = Flow::Plane { points: &at, flow: &at, camera: None };
-        let observations = Whitening::new(&flow, &Noise::StandardDeviation(0.3), Placement::Start).whitened();
-        let motion = Motion::new([1.0, 0.0, 0.0], [0.0; 3]);
-        let tangent = tangents(&motion.u());
-        let mut nu = depths.clone();
-        nu.resize(observations.stride, 0.0);
-        let m = information(&observations, &Weighted { motion: &motion, tangent: &tangent, nu: &nu }, 0.0);
-        let p = equations(&observations, &motion, &tangent, None).p;
-        // The axis that lies in the plane is y; the other is z, along which nothing is seen at the centre.
-        let axis = usize::from(tangent[(1, 1)].abs() > 0.5);
-        let (m, p) = (m[(axis, axis)], p[(axis, axis)]);
-        assert!((1.0 / m - bound.bound).abs() < 1e-12, "{m}");
-        assert!((1.0 / m + p / (m * m) - bound.likelihood).abs() < 1e-12, "{m} {p}");
-    }
-}

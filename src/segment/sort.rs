@@ -38,32 +38,3 @@ pub(super) fn sort_by_weight<K: EdgeKey>(edges: &mut Vec<Edge<K>>) {
 fn digit<K: EdgeKey>(edge: &Edge<K>, pass: usize) -> usize {
     edge.key.digit(pass as u32 * DIGIT_BITS, DIGITS - 1)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn numbered<K: Copy>(keys: &[K]) -> Vec<Edge<K>> {
-        keys.iter().zip(0..).map(|(&key, code)| Edge { key, code }).collect()
-    }
-
-    proptest! {
-        #[test]
-        fn agrees_with_the_standard_stable_sort(
-            narrow in prop::collection::vec(0u32..50, 0..200),
-            wide in prop::collection::vec(any::<u64>(), 0..200),
-        ) {
-            let mut expected = numbered(&narrow);
-            expected.sort_by_key(|edge| edge.key);
-            let mut edges = numbered(&narrow);
-            sort_by_weight(&mut edges);
-            prop_assert_eq!(edges, expected);
-            let mut expected = numbered(&wide);
-            expected.sort_by_key(|edge| edge.key);
-            let mut edges = numbered(&wide);
-            sort_by_weight(&mut edges);
-            prop_assert_eq!(edges, expected);
-        }
-    }
-}

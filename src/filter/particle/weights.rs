@@ -40,26 +40,3 @@ fn effective(weights: impl Iterator<Item = f64>) -> f64 {
     let (sum, squares) = weights.fold((0.0, 0.0), |(sum, squares), w| (sum + w, squares + w * w));
     if squares > 0.0 { sum * sum / squares } else { 0.0 }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn normalised_weights_are_those_of_division(
-            weights in prop::collection::vec(1e-6f64..1.0, 1..40), shift in -600.0f64..600.0
-        ) {
-            let mut logs: Vec<f64> = weights.iter().map(|w| w.ln() + shift).collect();
-            let sum: f64 = weights.iter().sum();
-            prop_assert!((normalise_log_weights(&mut logs).unwrap() - (sum.ln() + shift)).abs() < 1e-10);
-            for (log, weight) in logs.iter().zip(&weights) {
-                prop_assert!((log.exp() - weight / sum).abs() < 1e-11);
-            }
-            let ess = effective_sample_size_of_logs(&logs);
-            prop_assert!((ess - effective_sample_size(&weights)).abs() < 1e-9 * ess);
-            prop_assert!(ess > 1.0 - 1e-9 && ess < weights.len() as f64 + 1e-9);
-        }
-    }
-}

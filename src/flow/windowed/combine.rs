@@ -70,33 +70,3 @@ impl Combination {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn combinations_follow_their_weights_and_are_zero_outside() {
-        let frames: Vec<Frame<f64>> =
-            (0..3).map(|k| Frame::from_fn(4, 3, |x, y| ((5 * k + 3 * x + 7 * y) as f64).sin())).collect();
-        for (n, scheme) in [(2, TimeScheme::Central), (3, TimeScheme::Central), (3, TimeScheme::Backward)] {
-            let refs: Vec<&Frame<f64>> = frames.iter().take(n).collect();
-            let combination = Combination::of(n, scheme);
-            let mut out = vec![9.0; 3 * 35];
-            combination.apply(&refs, (-2, -1), 7, out[..n.min(3) * 35].chunks_exact_mut(35));
-            for k in 0..if n == 3 { 3 } else { 2 } {
-                for y in 0..5 {
-                    for x in 0..7 {
-                        let inside = (2..6).contains(&x) && (1..4).contains(&y);
-                        let want: f64 = if inside {
-                            (0..n).map(|f| combination.weights()[k][f] * frames[f].get(x - 2, y - 1)).sum()
-                        } else {
-                            0.0
-                        };
-                        assert!((out[k * 35 + y * 7 + x] - want).abs() < 1e-14);
-                    }
-                }
-            }
-        }
-    }
-}

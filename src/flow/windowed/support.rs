@@ -67,38 +67,3 @@ impl Support {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn damage_spreads_by_the_reach_and_names_its_cause() {
-        let reach = Reach { left: 1, right: 1, up: 1, down: 1 };
-        let mut frame = Frame::filled(9, 8, 1.0f32);
-        let whole = Support::new(&[&frame], None, reach, 0);
-        assert!(whole.status(0, 3) == Status::Border && whole.status(1, 1) == Status::Ok);
-        frame.data_mut()[4 * 9 + 4] = f32::INFINITY;
-        let mut mask = Frame::filled(9, 8, true);
-        mask.data_mut()[2 * 9 + 7] = false;
-        let support = Support::new(&[&frame], Some(&mask), reach, 0);
-        for y in 1..7usize {
-            for x in 1..8usize {
-                let want = if x.abs_diff(7) <= 1 && y.abs_diff(2) <= 1 {
-                    Status::Masked
-                } else if x.abs_diff(4) <= 1 && y.abs_diff(4) <= 1 {
-                    Status::NonFinite
-                } else {
-                    Status::Ok
-                };
-                assert_eq!(support.status(x, y), want, "{x} {y}");
-            }
-        }
-        let mut row = [7.0f32; 12];
-        support.weights(-2, 4, &mut row);
-        assert_eq!(row, [0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0]);
-        support.weights(-2, -1, &mut row);
-        assert_eq!(row, [0.0; 12]);
-        assert_eq!(Support::new(&[&frame], None, reach, 1).status(2, 2), Status::NonFinite);
-    }
-}

@@ -19,20 +19,6 @@ fn variational_proportions_of_case_d1() {
     assert_near(&proportions, &[0.444_085_478_3, 0.302_767_529_2, 0.222_411_085_4], 1e-9);
 }
 
-#[test]
-fn hard_divisions_have_their_exact_score() {
-    let (x, w, _) = case_d1();
-    let points = Points { dimensions: 2, values: &x, weights: Some(&w) };
-    let score = |k: usize, label: fn(usize) -> usize| {
-        let options = DirichletOptions { n_components: k, ..options(1) };
-        let problem = em::Problem::new(&points, &options).unwrap();
-        let labels: Vec<usize> = (0..20).map(label).collect();
-        let start = crate::mixture::start::from_labels(&points, &problem.planes.centre, k, &labels);
-        problem.scorer.score(&start.moments, start.negentropy).unwrap()
-    };
-    assert_near(&[score(1, |_| 0), score(2, |n| n % 2)], &[-219.655_393_200_6, -97.525_072_635_4], 1e-9);
-}
-
 /// What pooling does to F when the responsibilities are held, from the definition: the oracle of the sums
 /// behind it.
 #[test]

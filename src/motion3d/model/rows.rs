@@ -247,42 +247,15 @@ mod tests {
     use super::*;
     use crate::motion3d::Motion;
 
-    /// `(first, second, depth half way)` of a point under a motion over a whole frame.
-    fn seen(motion: &Motion, first: [f64; 2], nu: f64) -> ([f64; 2], [f64; 2], f64) {
-        let turn = Matrix3::from_fn(|i, j| motion.rotation_matrix()[i][j]);
-        let before = Vector3::new(first[0], first[1], 1.0) / nu;
-        let after = turn * before + Vector3::from(motion.displacement());
-        let half = Motion { translation: motion.translation, rotation: motion.rotation.map(|w| 0.5 * w) };
-        let turn = Matrix3::from_fn(|i, j| half.rotation_matrix()[i][j]);
-        let middle = turn * before + 0.5 * Vector3::from(half.displacement());
-        (first, (after.xy() / after.z).into(), middle.z)
-    }
-
-    #[test]
-    fn rows_are_exact_for_the_rotation_that_was_taken_out() {
-        for rotation in [[0.0; 3], [1e-4, -2e-4, 1e-4], [0.1, -0.2, 0.15], [0.4, 0.3, -0.2]] {
-            let motion = Motion::new([0.6, 0.2, 0.75], rotation);
-            let turn = Derotation::new(&motion.w());
-            for (first, nu) in [([0.4, -0.3], 0.2), ([-0.5, 0.1], 0.05), ([0.0, 0.0], 1e-3)] {
-                let (first, second, depth) = seen(&motion, first, nu);
-                let turned = turn.out_of(first, second).unwrap();
-                let (t, d) = (turned.rows.g * motion.u(), turned.flow - turned.rows.r * motion.w());
-                let across = (t.y * d.x - t.x * d.y) / t.norm();
-                assert!(across.abs() < 1e-14, "{rotation:?}: {across}");
-                let got = turn.half_way(&motion.u()).depth(t.dot(&d) / t.norm_squared());
-                assert!((got * depth - 1.0).abs() < 1e-6, "{rotation:?}: {got} {depth}");
-                let moved = turn.displacement(&motion.u(), first, 1.0 / depth);
-                assert!((moved - (Vector2::from(second) - Vector2::from(first))).norm() < 1e-14, "{rotation:?}");
-            }
-        }
-    }
-
     /// A rotation that is a little more shows as the rows of `w` have it.
     #[test]
     fn the_rows_of_the_rotation_are_its_slope() {
         let rotation = Vector3::new(0.1, -0.2, 0.15);
         let motion = Motion::new([0.6, 0.2, 0.75], rotation.into());
-        let (first, second, _) = seen(&motion, [0.4, -0.3], 0.02);
+        let first = [0.4, -0.3];
+        let turn = Matrix3::from_fn(|i, j| motion.rotation_matrix()[i][j]);
+        let after = turn * Vector3::new(first[0], first[1], 1.0) / 0.02 + Vector3::from(motion.displacement());
+        let second = (after.xy() / after.z).into();
         let here = Derotation::new(&rotation).out_of(first, second).unwrap();
         for axis in 0..3 {
             let by = Vector3::ith(axis, 1e-6);
@@ -295,17 +268,6 @@ mod tests {
             // The displacement that is left moves the middle, too.
             assert!(off < 0.03, "{axis}: {off}");
         }
-    }
-
-    #[test]
-    fn screen_rows_are_the_flow_of_the_sphere() {
-        let eta = Vector3::new(0.48, -0.6, 0.64);
-        let motion = Motion::new([0.6, 0.2, 0.75], [0.02, -0.03, 0.01]);
-        let (rows, axes) = (Rows::sphere(&eta), tangents(&eta));
-        let flow = Vector3::from(motion.sphere_flow(eta.into(), 0.8));
-        let model = rows.g * motion.u() * 0.8 + rows.r * motion.w();
-        assert!((axes * flow - model).norm() < 1e-15);
-        assert!((axes.row(0).transpose().cross(&axes.row(1).transpose()) - eta).norm() < 1e-15);
     }
 
     #[test]

@@ -126,19 +126,6 @@ mod tests {
     }
 
     #[test]
-    fn solves_what_is_well_posed() {
-        for seed in 0..20 {
-            let (list, dense) = random(seed, 40);
-            let want = Vector6::new(0.3, -0.2, 0.01, 0.02, -0.02, 0.01);
-            let right = dense * want;
-            let got = solved::<f64>(list, right.into());
-            for i in 0..6 {
-                assert!((got[i] - want[i]).abs() < 1e-11, "{seed}");
-            }
-        }
-    }
-
-    #[test]
     fn singular_equations_give_steps_that_solve_them() {
         for (places, seed) in (0..6).flat_map(|places| (0..50).map(move |seed| (places, seed))) {
             let (list, dense) = random(seed, places);

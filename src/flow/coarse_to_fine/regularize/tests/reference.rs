@@ -88,23 +88,6 @@ pub(super) fn naive<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, c: &Smoot
     m
 }
 
-pub(super) fn energy<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, c: &Smoothness, noise: f64) -> f64 {
-    let size @ (w, h) = (motion.width, motion.height);
-    let mut sum = 0.0;
-    for (x, y) in (0..h).flat_map(|y| (0..w).map(move |x| (x, y))) {
-        let here = motion_at(motion, x, y);
-        let (n, r) = site(data, x, y);
-        let m = nalgebra::Vector6::from(here);
-        sum += (m.dot(&(n * m)) - 2.0 * m.dot(&r)) / (noise + data.at(ERROR, x, y).to_f64());
-        for way in [(1, 0), (0, 1)] {
-            let Some((nx, ny)) = beside(x, y, way, size) else { continue };
-            let (du, dj) = strain(&here, &motion_at(motion, nx, ny), (way.0 as f64, way.1 as f64));
-            sum += c.flow * squares(&du) + c.jacobian * squares(&dj);
-        }
-    }
-    sum
-}
-
 /// Random texture under a small window with the motion `truth` at each site; no data where that is `None`.
 pub(super) fn made<T: SimdReal>(
     width: usize,
