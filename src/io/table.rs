@@ -1,38 +1,17 @@
 //! Tables as CSV, written row by row.
 
-use super::write::AtomicFile;
+use super::write::Output;
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FieldLayout, FlowField};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// A CSV table with a header (RFC 4180, lines end in `\n`): to a file, which appears under its name when the
 /// table is finished, or to standard output.
 pub struct TableWriter {
-    csv: csv::Writer<Target>,
+    csv: csv::Writer<Output>,
     path: PathBuf,
     columns: usize,
-}
-
-enum Target {
-    File(AtomicFile),
-    Stream(Box<dyn Write + Send>),
-}
-
-impl Write for Target {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        match self {
-            Self::File(file) => file.write(bytes),
-            Self::Stream(stream) => stream.write(bytes),
-        }
-    }
-    fn flush(&mut self) -> std::io::Result<()> {
-        match self {
-            Self::File(file) => file.flush(),
-            Self::Stream(stream) => stream.flush(),
-        }
-    }
 }
 
 impl std::fmt::Debug for TableWriter {
@@ -51,15 +30,8 @@ impl TableWriter {
 
     /// The same without a header, for rows of so many columns.
     pub fn create_without_header(path: impl AsRef<Path>, columns: usize) -> Result<Self> {
-        let path = path.as_ref();
-        if path == Path::new("-") {
-            return Ok(Self::new(Target::Stream(Box::new(std::io::stdout())), "standard output".into(), columns));
-        }
-        Ok(Self::new(Target::File(AtomicFile::create(path)?), path.to_path_buf(), columns))
-    }
-
-    fn new(target: Target, path: PathBuf, columns: usize) -> Self {
-        Self { csv: csv::WriterBuilder::new().flexible(true).from_writer(target), path, columns }
+        let (output, path) = Output::open(path.as_ref())?;
+        Ok(Self { csv: csv::WriterBuilder::new().flexible(true).from_writer(output), path, columns })
     }
 
     /// Adds a row.
@@ -99,14 +71,11 @@ impl TableWriter {
     }
 
     fn end(self, other: Option<&Path>) -> Result<()> {
-        let target =
+        let output =
             self.csv.into_inner().map_err(|e| Error::io(&self.path, std::io::Error::from(e.error().kind())))?;
-        match target {
-            Target::File(file) => match other {
-                Some(path) => file.commit_as(path),
-                None => file.commit(),
-            },
-            Target::Stream(mut stream) => stream.flush().map_err(|e| Error::io(&self.path, e)),
+        match (output, other) {
+            (Output::File(file), Some(path)) => file.commit_as(path),
+            (output, _) => output.finish(),
         }
     }
 }

@@ -185,6 +185,46 @@ impl Seek for Inner {
     }
 }
 
+/// A file, or standard output.
+#[derive(Debug)]
+pub(super) enum Output {
+    File(AtomicFile),
+    Stream(BufWriter<io::Stdout>),
+}
+
+impl Output {
+    /// The file at `path`, or standard output for `-`, and its name in messages.
+    pub fn open(path: &Path) -> Result<(Self, PathBuf)> {
+        if path == Path::new("-") {
+            return Ok((Self::Stream(BufWriter::new(io::stdout())), "standard output".into()));
+        }
+        Ok((Self::File(AtomicFile::create(path)?), path.to_path_buf()))
+    }
+
+    /// Writes what is left, and gives a file its name.
+    pub fn finish(self) -> Result<()> {
+        match self {
+            Self::File(file) => file.commit(),
+            Self::Stream(mut stream) => stream.flush().map_err(|e| Error::io("standard output", e)),
+        }
+    }
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::File(file) => file.write(bytes),
+            Self::Stream(stream) => stream.write(bytes),
+        }
+    }
+    fn flush(&mut self) -> io::Result<()> {
+        match self {
+            Self::File(file) => file.flush(),
+            Self::Stream(stream) => stream.flush(),
+        }
+    }
+}
+
 /// Writes a whole file: `write` fills it, then it gets its name. An error keeps what was there.
 pub fn atomic<R>(path: impl AsRef<Path>, write: impl FnOnce(&mut AtomicFile) -> Result<R>) -> Result<R> {
     let mut file = AtomicFile::create(path)?;

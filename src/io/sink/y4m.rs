@@ -3,10 +3,10 @@
 use super::{FrameSink, Kind, Uniform};
 use crate::error::{Error, Result};
 use crate::io::channels::FrameFormat;
-use crate::io::write::AtomicFile;
+use crate::io::write::{AtomicFile, Output};
 use crate::io::ycbcr::Coding;
 use crate::types::{AnyColourFrame, AnyFrame, Sample};
-use std::io::{self, BufWriter, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 pub(super) const KIND: Kind = Kind {
@@ -25,44 +25,19 @@ pub struct Y4mSink {
     uniform: Uniform,
 }
 
-#[derive(Debug)]
-enum Output {
-    File(AtomicFile),
-    Stream(BufWriter<io::Stdout>),
-}
-
-impl Write for Output {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        match self {
-            Self::File(file) => file.write(bytes),
-            Self::Stream(stream) => stream.write(bytes),
-        }
-    }
-    fn flush(&mut self) -> io::Result<()> {
-        match self {
-            Self::File(file) => file.flush(),
-            Self::Stream(stream) => stream.flush(),
-        }
-    }
-}
-
 impl Y4mSink {
     /// Begins a file, which appears under its name when it is finished.
     pub fn create(path: impl AsRef<Path>, frame_rate: f64) -> Result<Self> {
         let path = path.as_ref();
-        Ok(Self::new(Output::File(AtomicFile::create(path)?), path.to_path_buf(), frame_rate))
+        Ok(Self::new((Output::File(AtomicFile::create(path)?), path.to_path_buf()), frame_rate))
     }
 
     /// A file, or standard output for `-`.
     fn open(spec: &str, frame_rate: f64) -> Result<Self> {
-        if spec == "-" {
-            let output = Output::Stream(BufWriter::new(io::stdout()));
-            return Ok(Self::new(output, "standard output".into(), frame_rate));
-        }
-        Self::create(spec, frame_rate)
+        Ok(Self::new(Output::open(spec.as_ref())?, frame_rate))
     }
 
-    fn new(output: Output, path: PathBuf, frame_rate: f64) -> Self {
+    fn new((output, path): (Output, PathBuf), frame_rate: f64) -> Self {
         Self { output, path, rate: ratio(frame_rate), uniform: Uniform::default() }
     }
 
@@ -73,13 +48,6 @@ impl Y4mSink {
         let parts = [if first { header.as_bytes() } else { &[] }, b"FRAME\n", planes];
         let written = parts.iter().try_for_each(|part| self.output.write_all(part));
         written.map_err(|e| Error::io(&self.path, e))
-    }
-
-    fn end(self) -> Result<()> {
-        match self.output {
-            Output::File(file) => file.commit(),
-            Output::Stream(mut stream) => stream.flush().map_err(|e| Error::io(&self.path, e)),
-        }
     }
 }
 
@@ -131,7 +99,7 @@ impl FrameSink for Y4mSink {
         }
     }
     fn finish(self: Box<Self>) -> Result<()> {
-        self.end()
+        self.output.finish()
     }
 }
 
@@ -144,7 +112,7 @@ impl FrameSink<AnyColourFrame> for Y4mSink {
         }
     }
     fn finish(self: Box<Self>) -> Result<()> {
-        self.end()
+        self.output.finish()
     }
 }
 
