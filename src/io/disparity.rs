@@ -1,17 +1,17 @@
 //! Disparity maps in files: `.npz`, `.pfm`, and the 16-bit PNG of the KITTI benchmark.
 
-use super::decode::{check_size, png_error};
 use super::npz::{NpzReader, NpzWriter};
 use super::pfm::{FloatMap, read_pfm, write_pfm};
-use super::write::atomic;
+use super::sixteen_bit_png::SixteenBitPng;
 use crate::error::{Error, Result};
 use crate::types::{Frame, choices};
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 /// Steps of a KITTI disparity PNG in one px.
 const STEPS: f64 = 256.0;
+
+const PNG: SixteenBitPng =
+    SixteenBitPng { what: "disparity", colour: png::ColorType::Grayscale, colour_in_words: "grey" };
 
 /// How a disparity map is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,39 +142,14 @@ fn write_kitti_disparity(path: &Path, disparity: &Frame<f32>) -> Result<usize> {
         lost += usize::from(value.is_finite() && !held);
         bytes.extend(if held { sample as u16 } else { 0 }.to_be_bytes());
     }
-    atomic(path, |file| {
-        let mut encoder = png::Encoder::new(file, disparity.width() as u32, disparity.height() as u32);
-        encoder.set_color(png::ColorType::Grayscale);
-        encoder.set_depth(png::BitDepth::Sixteen);
-        let written = encoder.write_header().and_then(|mut png| {
-            png.write_image_data(&bytes)?;
-            png.finish()
-        });
-        written.map_err(|e| Error::io(path, e.into()))
-    })?;
+    PNG.write(path, disparity.size(), &bytes)?;
     Ok(lost)
 }
 
 fn read_kitti_disparity(path: &Path) -> Result<Frame<f32>> {
-    let file = File::open(path).map_err(|e| Error::io(path, e))?;
-    let mut reader = png::Decoder::new(BufReader::new(file)).read_info().map_err(|e| png_error(path, e))?;
-    let info = reader.info();
-    let (width, height) = (info.width as usize, info.height as usize);
-    if (info.color_type, info.bit_depth) != (png::ColorType::Grayscale, png::BitDepth::Sixteen) {
-        let message =
-            format!("not a disparity PNG: expected 16-bit grey, got {:?} {:?}", info.bit_depth, info.color_type);
-        return Err(Error::format(path, message));
-    }
-    if info.interlaced {
-        return Err(Error::format(path, "an interlaced PNG; disparity PNGs are not interlaced"));
-    }
-    check_size(path, width, height)?;
     let mut values = Vec::new();
-    while let Some(row) = reader.next_row().map_err(|e| png_error(path, e))? {
-        for p in row.data().chunks_exact(2) {
-            let sample = u16::from_be_bytes([p[0], p[1]]);
-            values.push(if sample > 0 { f32::from(sample) / STEPS as f32 } else { f32::NAN });
-        }
-    }
+    let (width, height) = PNG.read(path, |[sample]| {
+        values.push(if sample > 0 { f32::from(sample) / STEPS as f32 } else { f32::NAN });
+    })?;
     Frame::new(width, height, values).map_err(|_| Error::format(path, "cut off"))
 }

@@ -21,6 +21,7 @@ mod pfm;
 mod picture_png;
 mod picture_sequence;
 mod sink;
+mod sixteen_bit_png;
 mod source;
 mod table;
 mod track_table;
