@@ -87,6 +87,14 @@ impl Error {
         Self::Argument { argument, expected: expected.into(), got: shortened(got.to_string()) }
     }
 
+    /// The same complaint about an argument of another name.
+    pub(crate) fn about(self, argument: &'static str) -> Self {
+        match self {
+            Self::Argument { expected, got, .. } => Self::Argument { argument, expected, got },
+            other => other,
+        }
+    }
+
     /// A failed file operation on `path`.
     pub fn io(path: impl AsRef<Path>, source: std::io::Error) -> Self {
         Self::Io { path: path.as_ref().to_path_buf(), source }

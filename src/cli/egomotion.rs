@@ -172,11 +172,7 @@ impl EgomotionCommand {
         if path == Path::new("-") || Some(path) == self.output.as_deref() {
             return Err(refuse(path.display().to_string()));
         }
-        let target = table_target(Some(path), self.force, false).map_err(|error| match error {
-            Error::Argument { expected, got, .. } => Error::Argument { argument: "alternatives", expected, got },
-            other => other,
-        });
-        target.map(Some)
+        table_target(Some(path), self.force, false).map(Some).map_err(|error| error.about("alternatives"))
     }
 
     /// Whether a folder may be written into.

@@ -65,10 +65,7 @@ impl Album {
     /// Refuses, naming `argument`, to replace a sequence, or to mix pictures with those of an earlier run.
     pub fn check(path: &Path, stem: &str, argument: &'static str) -> Result<()> {
         if is_sequence(path, argument)? {
-            return check_target(path, false).map_err(|error| match error {
-                Error::Argument { expected, got, .. } => Error::Argument { argument, expected, got },
-                other => other,
-            });
+            return check_target(path, false).map_err(|error| error.about(argument));
         }
         match earlier(path, stem).into_iter().next() {
             Some(path) => {

@@ -67,7 +67,7 @@ impl TrackCommand {
         let mut wanted = self.output.wanted(self.messages.json, pictures || any)?;
         for (path, format, option) in given {
             let Some(path) = path else { continue };
-            check_target(path, self.output.force).map_err(|error| named(error, option))?;
+            check_target(path, self.output.force).map_err(|error| error.about(option))?;
             let target = TableTarget::File(path.clone());
             if wanted.iter().any(|(other, _)| *other == target) {
                 return Err(Error::argument(option, "a file of its own", path.display()));
@@ -105,13 +105,5 @@ impl TrackCommand {
             sinks.push(Box::new(ParticleRows::create(target, *format)?));
         }
         Ok(sinks)
-    }
-}
-
-/// The error about a place under the name that the option for it has.
-fn named(error: Error, option: &'static str) -> Error {
-    match error {
-        Error::Argument { expected, got, .. } => Error::Argument { argument: option, expected, got },
-        other => other,
     }
 }
