@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::motion3d::{self, FieldOptions, Intrinsics, MotionOptions};
 use crate::pipeline::{Egomotion, EgomotionPlan, TableTarget};
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Options of `egomotion`.
@@ -108,10 +108,8 @@ impl EgomotionCommand {
         )?;
         let sink = Egomotion::open(plan)?;
         let mut details = input_details(&opened, &self.grid);
-        if let Value::Object(details) = &mut details {
-            details.insert("method".into(), stream.estimator().method().name().into());
-            details.insert("estimator".into(), json!(self.estimator));
-        }
+        details["method"] = stream.estimator().method().name().into();
+        details["estimator"] = json!(self.estimator);
         let context =
             ReportContext { command: "egomotion", messages: &self.messages, output: self.output.as_deref(), details };
         if is_double {

@@ -17,7 +17,6 @@ use crate::simd::SimdReal;
 use crate::temporal::{FlowFilter, FlowFilterOptions};
 use crate::types::Precision;
 use clap::Args;
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Options of `filter`.
@@ -113,10 +112,8 @@ impl FilterCommand {
         let options = stage.options();
         let description = describe_filter(options);
         let mut details = input_details(&opened, &self.grid);
-        if let Value::Object(details) = &mut details {
-            details.insert("form".into(), options.form.name().into());
-            details.insert("save_state".into(), serde_json::json!(self.save_state));
-        }
+        details["form"] = options.form.name().into();
+        details["save_state"] = serde_json::json!(self.save_state);
         let plan: OutputPlan = plan_output(&self.output, &options.sites, self.messages.json, opened.frames)?;
         expect_output(&plan, self.messages.json, self.save_state.is_some())?;
         let sinks = plan.sinks(description.to_string(), self.output.ranges())?;

@@ -80,11 +80,9 @@ pub fn prepare(
         simd,
     };
     let mut description = method.describe(&chosen);
-    if let Value::Object(object) = &mut description {
-        object.insert("quantise".into(), json!(input.quantise));
-        object.insert("smooth".into(), json!(input.smooth));
-        object.insert("input".into(), json!(opened.name));
-    }
+    description["quantise"] = json!(input.quantise);
+    description["smooth"] = json!(input.smooth);
+    description["input"] = json!(opened.name);
     let steps = preprocess(input, common.mask.as_ref())?;
     let plan = StreamPlan::new(Estimator::new(chosen, common)?, steps, recursive)?;
     Ok(Prepared { plan, is_double: in_double(compute_arguments.precision, &opened.first, false), description })
@@ -158,9 +156,7 @@ impl FlowCommand {
         expect_output(&plan, self.messages.json, false)?;
         plan.check_parameters(estimator.model().parameters().iter().map(|parameter| parameter.name))?;
         let mut details = input_details(&opened, &self.grid);
-        if let Value::Object(details) = &mut details {
-            details.insert("method".into(), description["method"].clone());
-        }
+        details["method"] = description["method"].clone();
         let context =
             ReportContext { command: "flow", messages: &self.messages, output: self.output.output.as_deref(), details };
         let (description, ranges) = (description.to_string(), self.output.ranges());

@@ -168,15 +168,13 @@ fn npz_info(path: &Path) -> Result<Value> {
     let planes = field.layout.parameters.iter().map(|name| (name.as_str(), field.plane(name).unwrap_or(&[]).to_vec()));
     let mut info = planes_info(path, "npz", (field.width, field.height), planes);
     let valid = field.status.iter().filter(|status| status.is_valid()).count();
-    if let Value::Object(info) = &mut info {
-        info.insert("valid_share".into(), json!(valid as f64 / field.len().max(1) as f64));
-        info.insert("model".into(), json!(field.layout.model));
-        info.insert("frame_index".into(), json!(field.layout.frame_index));
-        info.insert("frame_period".into(), json!(field.layout.frame_period));
-        info.insert("covariance".into(), json!(field.covariance.is_some()));
-        info.insert("options".into(), json!(stored.options));
-        info.insert("library".into(), json!(stored.library));
-    }
+    info["valid_share"] = json!(valid as f64 / field.len().max(1) as f64);
+    info["model"] = json!(field.layout.model);
+    info["frame_index"] = json!(field.layout.frame_index);
+    info["frame_period"] = json!(field.layout.frame_period);
+    info["covariance"] = json!(field.covariance.is_some());
+    info["options"] = json!(stored.options);
+    info["library"] = json!(stored.library);
     Ok(info)
 }
 

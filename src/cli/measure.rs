@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::flow::derived::Quantity;
 use crate::pipeline::Measurements;
 use clap::Args;
-use serde_json::{Value, json};
+use serde_json::json;
 use std::path::PathBuf;
 
 /// Options of `measure`.
@@ -69,10 +69,8 @@ impl MeasureCommand {
         )?;
         let sink = Measurements::open(&target, quantities)?;
         let mut details = input_details(&opened, &self.grid);
-        if let Value::Object(details) = &mut details {
-            details.insert("quantities".into(), json!(self.quantity));
-            details.insert("method".into(), plan.estimator().method().name().into());
-        }
+        details["quantities"] = json!(self.quantity);
+        details["method"] = plan.estimator().method().name().into();
         let context =
             ReportContext { command: "measure", messages: &self.messages, output: self.output.as_deref(), details };
         if is_double {
