@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::image::luminance;
-use crate::types::{AnyColourFrame, AnyFrame, ColourFrame, Frame, Sample};
+use crate::types::{AnyColourFrame, AnyFrame, Frame, Sample};
 use std::fmt::Debug;
 use std::path::Path;
 
@@ -47,14 +47,6 @@ pub trait FrameFormat: Send + 'static {
     fn dtype(&self) -> &'static str;
 }
 
-/// A sample type that frames are stored in.
-pub trait StoredSample: Sample {
-    /// The frame with its type as data.
-    fn grey(frame: Frame<Self>) -> AnyFrame;
-    /// The frame with its type as data.
-    fn colour(frame: ColourFrame<Self>) -> AnyColourFrame;
-}
-
 macro_rules! formats {
     ($($frame:ident)*) => {$(
         impl FrameFormat for $frame {
@@ -68,20 +60,6 @@ macro_rules! formats {
     )*};
 }
 formats!(AnyFrame AnyColourFrame);
-
-macro_rules! stored {
-    ($($t:ty => $variant:ident),*) => {$(
-        impl StoredSample for $t {
-            fn grey(frame: Frame<Self>) -> AnyFrame {
-                AnyFrame::$variant(frame)
-            }
-            fn colour(frame: ColourFrame<Self>) -> AnyColourFrame {
-                AnyColourFrame::$variant(frame)
-            }
-        }
-    )*};
-}
-stored!(u8 => U8, u16 => U16, f32 => F32, f64 => F64);
 
 /// Decoded samples of a picture, `[row][col][channel]`, on their way to a frame.
 #[derive(Debug)]
@@ -125,7 +103,7 @@ pub trait ChannelPolicy: Copy + Debug + Send + Sync + 'static {
     /// # Errors
     /// [`Error::Format`] with the path when the policy refuses the picture, or it holds another number of
     /// samples than its size says.
-    fn frame<S: StoredSample>(self, picture: Channels<'_, S>) -> Result<Self::Frame>;
+    fn frame<S: Sample>(self, picture: Channels<'_, S>) -> Result<Self::Frame>;
 
     /// Refuses a layout of `count` channels whose content need not be looked at.
     ///
@@ -140,7 +118,7 @@ pub trait ChannelPolicy: Copy + Debug + Send + Sync + 'static {
 impl ChannelPolicy for Colour {
     type Frame = AnyFrame;
 
-    fn frame<S: StoredSample>(self, picture: Channels<'_, S>) -> Result<AnyFrame> {
+    fn frame<S: Sample>(self, picture: Channels<'_, S>) -> Result<AnyFrame> {
         if self == Self::Error && picture.holds_colour() {
             return Err(refuse_colour(picture.path));
         }
@@ -163,7 +141,7 @@ impl ChannelPolicy for Colour {
 impl ChannelPolicy for Grey {
     type Frame = AnyColourFrame;
 
-    fn frame<S: StoredSample>(self, picture: Channels<'_, S>) -> Result<AnyColourFrame> {
+    fn frame<S: Sample>(self, picture: Channels<'_, S>) -> Result<AnyColourFrame> {
         self.check_layout(picture.path, picture.count)?;
         let Channels { path, width, height, .. } = picture;
         let frame = Frame::new(width, height, picture.pixels());

@@ -1,7 +1,8 @@
 //! Image files to grey or colour frames.
 
-use super::{channels::ChannelPolicy, channels::Channels, channels::StoredSample, jpeg};
+use super::{channels::ChannelPolicy, channels::Channels, jpeg};
 use crate::error::{Error, Result};
+use crate::types::Sample;
 use ::image::{DynamicImage, ImageError, ImageFormat, ImageReader};
 use std::fs::File;
 use std::io::{BufReader, ErrorKind};
@@ -108,7 +109,7 @@ struct Place<'a> {
 }
 
 impl Place<'_> {
-    fn frame<S: StoredSample, P: ChannelPolicy>(&self, count: usize, samples: Vec<S>, policy: P) -> Result<P::Frame> {
+    fn frame<S: Sample, P: ChannelPolicy>(&self, count: usize, samples: Vec<S>, policy: P) -> Result<P::Frame> {
         policy.frame(Channels { path: self.path, width: self.width, height: self.height, count, samples })
     }
 }

@@ -109,37 +109,22 @@ pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> P
     }
 }
 
-/// A sample type that [`AnyFrame`] knows.
-trait Wrapped: Sized {
-    fn wrap(frame: Frame<Self>) -> AnyFrame;
-}
-macro_rules! wrapped {
-    ($($t:ty => $variant:ident),*) => {$(
-        impl Wrapped for $t {
-            fn wrap(frame: Frame<Self>) -> AnyFrame {
-                AnyFrame::$variant(frame)
-            }
-        }
-    )*};
-}
-wrapped!(u8 => U8, u16 => U16, f32 => F32, f64 => F64);
-
 /// A frame of samples `T`; `None` where the array holds another type.
-fn grey<T: Element + Copy + Wrapped + 'static>(
+fn grey<T: Element + Sample>(
     array: &Bound<'_, PyUntypedArray>,
     (width, height): (usize, usize),
 ) -> Option<PyResult<AnyFrame>> {
-    Some(Frame::new(width, height, elements::<T>(array)?).map(T::wrap).map_err(PyErr::from))
+    Some(Frame::new(width, height, elements::<T>(array)?).map(T::grey).map_err(PyErr::from))
 }
 
 /// An interleaved colour frame as luminance.
-fn luminance<T: Sample + Element + Wrapped>(
+fn luminance<T: Sample + Element>(
     array: &Bound<'_, PyUntypedArray>,
     (width, height): (usize, usize),
     channels: usize,
 ) -> Option<PyResult<AnyFrame>> {
     let grey = crate::image::luminance(width, height, channels, &elements::<T>(array)?);
-    Some(grey.map(T::wrap).map_err(PyErr::from))
+    Some(grey.map(T::grey).map_err(PyErr::from))
 }
 
 /// What came as `frames`: a stack along the first axis, or a list or tuple of separate frames.

@@ -1,7 +1,7 @@
 //! Colour frames (H, W, 3) out of numpy arrays, and back.
 
 use super::{arrays::as_array, arrays::dtype_name, arrays::elements, arrays::owned, arrays::wrong_dtype};
-use crate::types::{AnyColourFrame, ColourFrame, Frame};
+use crate::types::{AnyColourFrame, ColourFrame, Frame, Sample};
 use numpy::{Element, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -12,14 +12,11 @@ pub fn colour_frame(argument: &str, object: &Bound<'_, PyAny>) -> PyResult<AnyCo
     match array.shape() {
         &[height, width, 3] => {
             let size = (width, height);
-            let of_any_type = || {
-                pixels::<u8>(&array, size)
-                    .map(|frame| frame.map(AnyColourFrame::U8))
-                    .or_else(|| Some(pixels::<u16>(&array, size)?.map(AnyColourFrame::U16)))
-                    .or_else(|| Some(pixels::<f32>(&array, size)?.map(AnyColourFrame::F32)))
-                    .or_else(|| Some(pixels::<f64>(&array, size)?.map(AnyColourFrame::F64)))
-            };
-            of_any_type().unwrap_or_else(|| Err(wrong_dtype(argument, &array)))
+            pixels::<u8>(&array, size)
+                .or_else(|| pixels::<u16>(&array, size))
+                .or_else(|| pixels::<f32>(&array, size))
+                .or_else(|| pixels::<f64>(&array, size))
+                .unwrap_or_else(|| Err(wrong_dtype(argument, &array)))
         }
         [height, width] => Err(PyValueError::new_err(format!(
             "{argument}: expected a colour frame (H, W, 3), got a grey frame ({height}, {width}); colour is needed"
@@ -32,12 +29,12 @@ pub fn colour_frame(argument: &str, object: &Bound<'_, PyAny>) -> PyResult<AnyCo
 }
 
 /// A frame of pixels of type `T`; `None` if the array holds another type.
-fn pixels<T: Element + Copy + 'static>(
+fn pixels<T: Element + Sample>(
     array: &Bound<'_, PyUntypedArray>,
     (width, height): (usize, usize),
-) -> Option<PyResult<ColourFrame<T>>> {
+) -> Option<PyResult<AnyColourFrame>> {
     let samples = elements::<T>(array)?;
-    Some(Frame::new(width, height, samples.as_chunks::<3>().0.to_vec()).map_err(PyErr::from))
+    Some(Frame::new(width, height, samples.as_chunks::<3>().0.to_vec()).map(T::colour).map_err(PyErr::from))
 }
 
 /// A frame of any sample type as a new array `(H, W, 3)`.

@@ -106,10 +106,14 @@ pub trait Sample: Copy + Send + Sync + 'static {
     fn to_real<T: Real>(self) -> T;
     /// The nearest sample to `value`; integers are kept in range, and NaN becomes 0.
     fn from_f64_nearest(value: f64) -> Self;
+    /// The grey frame with its type as data.
+    fn grey(frame: Frame<Self>) -> AnyFrame;
+    /// The colour frame with its type as data.
+    fn colour(frame: ColourFrame<Self>) -> AnyColourFrame;
 }
 
 macro_rules! samples {
-    ($($t:ty, $name:literal, $full:expr, |$value:ident| $nearest:expr;)*) => {$(
+    ($($t:ty, $variant:ident, $name:literal, $full:expr, |$value:ident| $nearest:expr;)*) => {$(
         impl Sample for $t {
             const DTYPE: &'static str = $name;
             const FULL_SCALE: f64 = $full;
@@ -121,14 +125,20 @@ macro_rules! samples {
             fn from_f64_nearest($value: f64) -> Self {
                 $nearest
             }
+            fn grey(frame: Frame<Self>) -> AnyFrame {
+                AnyFrame::$variant(frame)
+            }
+            fn colour(frame: ColourFrame<Self>) -> AnyColourFrame {
+                AnyColourFrame::$variant(frame)
+            }
         }
     )*};
 }
 samples! {
-    u8, "uint8", 255.0, |value| value.round() as u8;
-    u16, "uint16", 65535.0, |value| value.round() as u16;
-    f32, "float32", 1.0, |value| value as f32;
-    f64, "float64", 1.0, |value| value;
+    u8, U8, "uint8", 255.0, |value| value.round() as u8;
+    u16, U16, "uint16", 65535.0, |value| value.round() as u16;
+    f32, F32, "float32", 1.0, |value| value as f32;
+    f64, F64, "float64", 1.0, |value| value;
 }
 
 /// A colour image: red, green and blue of each pixel, `[row, col] = [y, x]`.

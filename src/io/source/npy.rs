@@ -2,9 +2,10 @@
 
 use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
-use crate::io::channels::{ChannelPolicy, Channels, Colour, ColourUse, StoredSample};
+use crate::io::channels::{ChannelPolicy, Channels, Colour, ColourUse};
 use crate::io::decode::check_size;
 use crate::io::npy::{Element, ElementType, NpyHeader};
+use crate::types::Sample;
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
@@ -85,7 +86,7 @@ impl<P: ChannelPolicy> NpySource<P> {
         Ok(Self { path, policy, file, header, data_start, frames, width, height, channels, next: 0, gathered })
     }
 
-    fn frame_of<T: Element + StoredSample>(&self, bytes: &[u8]) -> Result<P::Frame> {
+    fn frame_of<T: Element + Sample>(&self, bytes: &[u8]) -> Result<P::Frame> {
         let (path, width, height, count) = (self.path.as_path(), self.width, self.height, self.channels);
         let samples = T::decode(bytes, self.header.big_endian);
         self.policy.frame(Channels { path, width, height, count, samples })

@@ -2,9 +2,10 @@
 
 use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
-use crate::io::channels::{ChannelPolicy, Channels, Colour, ColourUse, StoredSample, refuse_colour};
+use crate::io::channels::{ChannelPolicy, Channels, Colour, ColourUse, refuse_colour};
 use crate::io::decode::check_size;
 use crate::io::ycbcr::Coding;
+use crate::types::Sample;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
@@ -162,7 +163,7 @@ impl<R: BufRead, P: ChannelPolicy> Y4mSource<R, P> {
     }
 
     /// Red, green and blue of every pixel, interleaved.
-    fn rgb<S: StoredSample>(&self, luma: &[u8], chroma: &[u8], [across, down]: [usize; 2]) -> Vec<S> {
+    fn rgb<S: Sample>(&self, luma: &[u8], chroma: &[u8], [across, down]: [usize; 2]) -> Vec<S> {
         let coding = Coding::new(self.layout.bits, self.full_range);
         let chroma: Vec<u16> = self.codes(chroma).collect();
         let (blue, red) = chroma.split_at(chroma.len() / 2);
@@ -174,7 +175,7 @@ impl<R: BufRead, P: ChannelPolicy> Y4mSource<R, P> {
         self.codes(luma).enumerate().flat_map(pixel).collect()
     }
 
-    fn picture<S: StoredSample>(&self, count: usize, samples: Vec<S>) -> Result<P::Frame> {
+    fn picture<S: Sample>(&self, count: usize, samples: Vec<S>) -> Result<P::Frame> {
         self.policy.frame(Channels { path: &self.name, width: self.width, height: self.height, count, samples })
     }
 
