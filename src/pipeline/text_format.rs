@@ -12,7 +12,9 @@ pub trait TextFormat: Copy + PartialEq + 'static {
     fn name(self) -> &'static str;
 
     /// The extension of its files.
-    fn extension(self) -> &'static str;
+    fn extension(self) -> &'static str {
+        self.name()
+    }
 
     /// The format called `name`.
     ///

@@ -4,7 +4,7 @@ use super::ParticleFrame;
 use crate::error::Result;
 use crate::image::{picture::GreyRange, picture::TrackColours};
 use crate::pipeline::album::Album;
-use crate::pipeline::sink::{Ending, Sink};
+use crate::pipeline::sink::{Sink, ends_as};
 use crate::pipeline::track::Overlays;
 use std::path::{Path, PathBuf};
 
@@ -42,13 +42,7 @@ impl Sink<ParticleFrame<'_>> for ForegroundMaps {
         self.album.add_grey(step.frame_index, map.map(|share| (255.0 * share).round() as u8))
     }
 
-    fn finish(&mut self, ending: Ending) -> Result<()> {
-        self.album.finish(ending)
-    }
-
-    fn files(&self) -> (usize, Option<PathBuf>) {
-        self.album.files()
-    }
+    ends_as!(album);
 }
 
 impl Sink<ParticleFrame<'_>> for Overlays {
@@ -59,11 +53,5 @@ impl Sink<ParticleFrame<'_>> for Overlays {
         self.draw(step.frame_index, range.colour_picture(step.frame), targets)
     }
 
-    fn finish(&mut self, ending: Ending) -> Result<()> {
-        self.album.finish(ending)
-    }
-
-    fn files(&self) -> (usize, Option<PathBuf>) {
-        self.album.files()
-    }
+    ends_as!(album);
 }

@@ -3,7 +3,7 @@
 use super::ParticleFrame;
 use crate::error::Result;
 use crate::io::cell;
-use crate::pipeline::sink::{Ending, Sink, TableTarget};
+use crate::pipeline::sink::{Sink, TableTarget, ends_as};
 use crate::pipeline::track::{Row, RowWriter, TrackFormat};
 use crate::track::particle::ParticleTarget;
 use std::path::PathBuf;
@@ -50,11 +50,5 @@ impl Sink<ParticleFrame<'_>> for ParticleRows {
         self.rows.write((step.frame_index, step.time), step.targets.iter().map(row))
     }
 
-    fn finish(&mut self, ending: Ending) -> Result<()> {
-        self.rows.finish(ending)
-    }
-
-    fn files(&self) -> (usize, Option<PathBuf>) {
-        self.rows.files()
-    }
+    ends_as!(rows);
 }

@@ -1,6 +1,6 @@
 //! Derived quantities of a region or of points, one row each and frame.
 
-use super::{Ending, Sink, Step, table::Table, table::TableTarget};
+use super::{Sink, Step, ends_as, table::Table, table::TableTarget};
 use crate::error::{Error, Result};
 use crate::flow::derived::{Quantity, fit_region, value_and_std};
 use crate::io::cell;
@@ -91,11 +91,5 @@ impl<T: Real> Sink<Step<'_, T>> for Measurements {
         self.table.flush()
     }
 
-    fn finish(&mut self, ending: Ending) -> Result<()> {
-        self.table.finish(ending)
-    }
-
-    fn files(&self) -> (usize, Option<PathBuf>) {
-        self.table.files()
-    }
+    ends_as!(table);
 }

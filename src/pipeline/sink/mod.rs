@@ -62,6 +62,20 @@ pub trait Sink<S>: Send {
     }
 }
 
+/// The end of a sink that writes everything through its field `$field`; `$graph`: what else it is given then.
+macro_rules! ends_as {
+    ($field:ident $(, $graph:ty)?) => {
+        fn finish(&mut self, ending: crate::pipeline::sink::Ending $(, _: $graph)?) -> Result<()> {
+            self.$field.finish(ending)
+        }
+
+        fn files(&self) -> (usize, Option<PathBuf>) {
+            self.$field.files()
+        }
+    };
+}
+pub(in crate::pipeline) use ends_as;
+
 /// A receiver of fields.
 pub type FieldSink<T> = dyn for<'a> Sink<Step<'a, T>>;
 

@@ -1,6 +1,6 @@
 //! The graph of all clusters, as text and as a picture.
 
-use super::{StereoSink, StereoStep};
+use super::StereoSink;
 use crate::error::{Error, Result};
 use crate::image::{picture::ChartArc, picture::ChartNode, picture::chart_picture};
 use crate::io::write::atomic;
@@ -34,10 +34,6 @@ fn write_text(path: &Path, text: &str) -> Result<()> {
 }
 
 impl StereoSink for GraphFile {
-    fn accept(&mut self, _step: &StereoStep<'_>) -> Result<()> {
-        Ok(())
-    }
-
     fn finish(&mut self, ending: Ending, graph: &TrackGraph) -> Result<()> {
         let text = graph.to_json()? + "\n";
         let any = graph.nodes().next().is_some();
@@ -76,10 +72,6 @@ impl GraphChart {
 }
 
 impl StereoSink for GraphChart {
-    fn accept(&mut self, _step: &StereoStep<'_>) -> Result<()> {
-        Ok(())
-    }
-
     fn finish(&mut self, ending: Ending, graph: &TrackGraph) -> Result<()> {
         let (mut nodes, mut places) = (Vec::new(), BTreeMap::new());
         for node in graph.nodes() {

@@ -4,7 +4,7 @@ use super::{StereoSink, StereoStep};
 use crate::error::Result;
 use crate::image::picture::{ClusterMark, GreyRange, Picture, cluster_picture, draw_disparity};
 use crate::pipeline::album::Album;
-use crate::pipeline::sink::Ending;
+use crate::pipeline::sink::ends_as;
 use crate::track::stereo::{Step, TrackGraph};
 use crate::types::Frame;
 use std::collections::BTreeMap;
@@ -99,11 +99,5 @@ impl StereoSink for StereoOverlays {
         self.album.add(step.frame_index, &picture)
     }
 
-    fn finish(&mut self, ending: Ending, _graph: &TrackGraph) -> Result<()> {
-        self.album.finish(ending)
-    }
-
-    fn files(&self) -> (usize, Option<PathBuf>) {
-        self.album.files()
-    }
+    ends_as!(album, &TrackGraph);
 }

@@ -3,7 +3,7 @@
 use super::{StereoSink, StereoStep};
 use crate::error::Result;
 use crate::io::cell;
-use crate::pipeline::sink::{Ending, Table, TableTarget};
+use crate::pipeline::sink::{Table, TableTarget, ends_as};
 use crate::pipeline::text_format::TextFormat;
 use crate::track::stereo::{Node, TrackGraph};
 use std::path::PathBuf;
@@ -21,10 +21,6 @@ impl TextFormat for StereoFormat {
     const ALL: &'static [Self] = &[Self::Csv, Self::Json];
 
     fn name(self) -> &'static str {
-        self.extension()
-    }
-
-    fn extension(self) -> &'static str {
         match self {
             Self::Csv => "csv",
             Self::Json => "json",
@@ -129,11 +125,5 @@ impl StereoSink for ClusterRows {
         self.table.flush()
     }
 
-    fn finish(&mut self, ending: Ending, _graph: &TrackGraph) -> Result<()> {
-        self.table.finish(ending)
-    }
-
-    fn files(&self) -> (usize, Option<PathBuf>) {
-        self.table.files()
-    }
+    ends_as!(table, &TrackGraph);
 }

@@ -161,20 +161,16 @@ impl TrackRun {
 
     fn deliver(&mut self, frame: &AnyFrame, states: &[TrackState]) -> Result<()> {
         let frame_index = self.numbering.index(self.summary.frames);
-        let time = self.numbering.rate.map(|rate| frame_index as f64 / rate);
+        let time = self.numbering.time(frame_index);
         let step = TrackStep { frame_index, time, frame, states };
         for sink in &mut self.sinks {
             sink.accept(&step)?;
         }
         self.summary.frames += 1;
-        self.count(states);
-        Ok(())
-    }
-
-    fn count(&mut self, states: &[TrackState]) {
         for (number, state) in (1..).zip(states) {
             self.summary.count(number, state);
         }
+        Ok(())
     }
 }
 

@@ -4,7 +4,7 @@ use super::TrackStep;
 use crate::error::Result;
 use crate::image::{picture::GreyRange, picture::PathPoint, picture::Picture, picture::TrackOverlay};
 use crate::pipeline::album::Album;
-use crate::pipeline::sink::{Ending, Sink};
+use crate::pipeline::sink::{Sink, ends_as};
 use crate::types::TrackState;
 use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
@@ -69,11 +69,5 @@ impl Sink<TrackStep<'_>> for Overlays {
         self.draw(step.frame_index, range.picture(step.frame), (1..).zip(step.states))
     }
 
-    fn finish(&mut self, ending: Ending) -> Result<()> {
-        self.album.finish(ending)
-    }
-
-    fn files(&self) -> (usize, Option<PathBuf>) {
-        self.album.files()
-    }
+    ends_as!(album);
 }

@@ -3,7 +3,7 @@
 use super::TrackStep;
 use crate::error::Result;
 use crate::io::{MotTable, TrackTable};
-use crate::pipeline::sink::{Ending, Sink, TableTarget, end_table};
+use crate::pipeline::sink::{Ending, Sink, TableTarget, end_table, ends_as};
 use crate::pipeline::text_format::TextFormat;
 use crate::types::TrackState;
 use std::path::{Path, PathBuf};
@@ -139,11 +139,5 @@ impl Sink<TrackStep<'_>> for TrackRows {
         self.rows.write((step.frame_index, step.time), step.states.iter().enumerate().map(row))
     }
 
-    fn finish(&mut self, ending: Ending) -> Result<()> {
-        self.rows.finish(ending)
-    }
-
-    fn files(&self) -> (usize, Option<PathBuf>) {
-        self.rows.files()
-    }
+    ends_as!(rows);
 }
