@@ -1,6 +1,6 @@
 //! `jacoflow.scenes.TargetScene`: colour scenes of targets that look alike, with exact boxes.
 
-use super::{arrays, options::Integer};
+use super::{arrays, options::Integer, scenes::hash};
 use crate::error::Error;
 use crate::parallel::Threads;
 use crate::python::keywords::getters;
@@ -8,7 +8,6 @@ use crate::synth::targets::{SCENES, TargetScene as CoreScene, TargetSceneOptions
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict, PyTuple};
-use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with
 /// exact boxes.
@@ -143,9 +142,7 @@ impl TargetScene {
 
     fn __hash__(&self) -> u64 {
         let options = self.core.options();
-        let mut hasher = DefaultHasher::new();
-        (self.core.name(), options.random_state, options.scale.to_bits(), options.frames).hash(&mut hasher);
-        hasher.finish()
+        hash(&(self.core.name(), options.random_state, options.scale.to_bits(), options.frames))
     }
 
     fn __repr__(&self) -> String {

@@ -27,10 +27,7 @@ impl ParticleFilter {
         finite("transition", &next)?;
         if let Some(roots) = roots {
             self.for_each_particle(Purpose::Transition, &mut next, |set, _, normal, next| {
-                let root = shared(&roots, set, n * n);
-                for (next, root) in next.iter_mut().zip(root.chunks_exact(n)) {
-                    *next += dot(root, normal);
-                }
+                add_product(shared(&roots, set, n * n), normal, next);
             });
         }
         self.take_over(next)
@@ -52,9 +49,7 @@ impl ParticleFilter {
         self.for_each_particle(Purpose::Transition, &mut next, |set, row, normal, next| {
             let (f, root) = (shared(f, set, n * n), shared(&roots, set, n * n));
             multiply_transposed(&x[row * n..(row + 1) * n], f, n, next);
-            for (next, root) in next.iter_mut().zip(root.chunks_exact(n)) {
-                *next += dot(root, normal);
-            }
+            add_product(root, normal, next);
         });
         self.take_over(next)
     }
@@ -86,6 +81,9 @@ impl ParticleFilter {
     }
 }
 
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+/// `next += root normal`.
+fn add_product(root: &[f64], normal: &[f64], next: &mut [f64]) {
+    for (next, row) in next.iter_mut().zip(root.chunks_exact(normal.len())) {
+        *next += row.iter().zip(normal).map(|(a, b)| a * b).sum::<f64>();
+    }
 }

@@ -61,6 +61,9 @@ impl Default for TrackOverlay {
 /// A place on a path: where the target's centre was, px, and how well it was in hand.
 pub type PathPoint = ([f64; 2], TrackStatus);
 
+/// Draws a side of a polygon.
+type DrawSide = fn(&TrackOverlay, &mut Picture, [f64; 2], [f64; 2], Rgb);
+
 impl TrackOverlay {
     /// Draws target number `target` over `picture`: its box, turned by its rotation where that is observable;
     /// the path that it came, in the colours of its status; its centre as a cross, with the ellipse that
@@ -77,12 +80,9 @@ impl TrackOverlay {
             return;
         }
         let corners = box_corners(state);
-        if by_target && !state.status.is_measured() {
-            self.dashed_polygon(picture, &corners, colour);
-        } else {
-            self.polygon(picture, &corners, colour);
-        }
-        self.polygon(picture, &ellipse(state), colour);
+        let side = if by_target && !state.status.is_measured() { Self::dashed } else { Self::stroke };
+        self.polygon(picture, &corners, colour, side);
+        self.polygon(picture, &ellipse(state), colour, Self::stroke);
         self.draw_cross(picture, state.position, colour);
         if let Some(label) = corners.iter().copied().reduce(|a, b| [a[0].min(b[0]), a[1].min(b[1])]) {
             let [x, y] = self.on_picture(label);
@@ -104,9 +104,9 @@ impl TrackOverlay {
         draw_stroke(picture, (x0, y0), (x1, y1), self.thickness, colour);
     }
 
-    fn polygon(&self, picture: &mut Picture, corners: &[[f64; 2]], colour: Rgb) {
+    fn polygon(&self, picture: &mut Picture, corners: &[[f64; 2]], colour: Rgb, side: DrawSide) {
         for (k, corner) in corners.iter().enumerate() {
-            self.stroke(picture, *corner, corners[(k + 1) % corners.len()], colour);
+            side(self, picture, *corner, corners[(k + 1) % corners.len()], colour);
         }
     }
 
@@ -115,12 +115,6 @@ impl TrackOverlay {
         let [x, y] = self.on_picture(centre);
         draw_stroke(picture, (x - CROSS, y), (x + CROSS, y), self.thickness, colour);
         draw_stroke(picture, (x, y - CROSS), (x, y + CROSS), self.thickness, colour);
-    }
-
-    fn dashed_polygon(&self, picture: &mut Picture, corners: &[[f64; 2]], colour: Rgb) {
-        for (k, from) in corners.iter().enumerate() {
-            self.dashed(picture, *from, corners[(k + 1) % corners.len()], colour);
-        }
     }
 
     fn dashed(&self, picture: &mut Picture, from: [f64; 2], to: [f64; 2], colour: Rgb) {

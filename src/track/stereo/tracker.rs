@@ -159,15 +159,10 @@ impl StereoTracker {
         }
     }
 
-    fn next_moment(&self) -> Clock {
+    fn advance(&mut self, left: &Frame<f32>, points: EdgePoints, lattice: Lattice) -> Result<Step> {
         let Clock { now, step_time, .. } = self.clock;
         let gap = self.waited.map_or(1.0, |dt| dt / step_time);
-        let now = if self.time == 0 { 0.0 } else { now + gap };
-        Clock { now, gap, step_time }
-    }
-
-    fn advance(&mut self, left: &Frame<f32>, points: EdgePoints, lattice: Lattice) -> Result<Step> {
-        self.clock = self.next_moment();
+        self.clock = Clock { now: if self.time == 0 { 0.0 } else { now + gap }, gap, step_time };
         let (points, left_out) = points.within(&lattice);
         let voxels = Voxels::count(&points, lattice);
         let luminance = CellLuminance::new(left, &lattice);

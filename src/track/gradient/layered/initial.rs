@@ -60,18 +60,13 @@ impl InitialSegmentation {
         self.frames >= MAX_FRAMES || self.moved.iter().any(|moved| moved.abs() >= MAX_DISPLACEMENT)
     }
 
-    /// A frame that is not looked at.
-    pub fn skip(&mut self) {
-        self.frames += 1;
-    }
-
     /// A frame beside the first.
     pub fn changes(&self, frame: &Frame<f64>, noise: f64) -> Changes<'_> {
         let now = Patch::cut(frame, self.cut).frame;
         Changes { segmentation: self, now, bar: CHANGE * noise * std::f64::consts::SQRT_2 }
     }
 
-    /// A frame that is looked at.
+    /// Counts a frame, looked at or not.
     pub fn advance(&mut self) {
         self.frames += 1;
     }

@@ -114,7 +114,7 @@ pub(super) fn update(tracker: &mut State, frame: Option<&Frame<f64>>, state: &mu
 }
 
 fn pass_over(tracker: &mut State, state: &mut TrackState, reason: &'static str) {
-    tracker.initial.iter_mut().for_each(InitialSegmentation::skip);
+    tracker.initial.iter_mut().for_each(InitialSegmentation::advance);
     tracker.motion.filter.predict();
     coast(tracker);
     report(tracker, state, None, [0.0; 2]);
