@@ -89,12 +89,13 @@ def interior(truth: Array) -> Mask:
     return known & inside(known.shape, 16) & (distance_transform_edt(~edge) > FROM_BOUNDARY)
 
 
-def intervals(field: jacoflow.FlowField, truth: Array) -> dict[str, float]:
+def intervals(field: jacoflow.FlowField, truth: Array, truth_std: float = 0.0) -> dict[str, float]:
     """Shares of 95 % intervals that hold: u, v and Jacobian (truth smoothed) in the interior, flow at all pixels with
     a truth; mean squared normalised error of (u, v), 1 if the covariance is right; share of large errors that are
-    silent, and of pixels with large errors."""
+    silent, and of pixels with large errors. `truth_std`, px, is the noise of the truth, which is part of the errors."""
     where, known = interior(truth), np.isfinite(truth).all(axis=-1)
     error, std = field.flow - truth, np.stack([field.std("u"), field.std("v")], axis=-1)
+    of_error = field.covariance[where][:, :2, :2] + truth_std**2 * np.eye(2)
     share = np.where(known, 1.0, 0.0)
     smooth = [gaussian_filter(np.nan_to_num(truth[..., c]), TRUTH_SIGMA) for c in (0, 1)]
     slopes = differences(np.stack(smooth, axis=-1) / np.maximum(gaussian_filter(share, TRUTH_SIGMA), 1e-9)[..., None])
@@ -102,10 +103,8 @@ def intervals(field: jacoflow.FlowField, truth: Array) -> dict[str, float]:
         np.abs(field.value(name) - slopes[..., row, column]) <= NORMAL * field.std(name)
         for name, row, column in (("u_x", 0, 0), ("u_y", 0, 1), ("v_x", 1, 0), ("v_y", 1, 1))
     ]
-    held = np.abs(error) <= NORMAL * std
-    squares = np.einsum(
-        "...i,...ij,...j", error[where], np.linalg.inv(field.covariance[where][:, :2, :2]), error[where]
-    )
+    held = np.abs(error) <= NORMAL * np.hypot(std, truth_std)
+    squares = np.einsum("...i,...ij,...j", error[where], np.linalg.inv(of_error), error[where])
     length = np.linalg.norm(error, axis=-1)
     large = known & (length > LARGE_ERROR)
     silent = large & (np.hypot(*np.moveaxis(std, -1, 0)) < length / 5) & (field.status == jacoflow.Status.OK)

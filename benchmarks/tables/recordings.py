@@ -134,9 +134,8 @@ def uncertainty(data: Path, presets: tuple[str, ...] = ("balanced", "fast", "acc
             frames = sample.pair() if count == 2 else sample.frames
             method = jacoflow.CoarseToFine(preset=preset, time_scheme="pair" if count == 2 else None)
             found_field = jacoflow.estimate(frames, method=method)
-            rows.append(
-                {"sample": sample.name, "preset": preset, "frames": count, **intervals(found_field, sample.truth)}
-            )
+            shares = intervals(found_field, sample.truth, sample.truth_std)
+            rows.append({"sample": sample.name, "preset": preset, "frames": count, **shares})
     return rows + [{"sample": line, "preset": "skipped"} for line in missing]
 
 
