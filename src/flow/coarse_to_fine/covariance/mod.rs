@@ -69,7 +69,7 @@ const REPEATED_NOISE_SHARE: f64 = 0.3;
 
 /// Variance of the flow and of its slopes, px^-2, over the scatter between frames with and without their
 /// finest detail that noise does not explain; and that of noise alone over its variance in the flow.
-const DETAIL_SHARES: [f64; 3] = [2.0, 0.01, 0.01];
+const DETAIL_SHARES: [f64; 3] = [2.5, 0.0125, 0.0125];
 /// Share of these on coarser levels, whose frames are smooth already.
 const COARSE_DETAIL_SHARE: f64 = 0.4;
 const NOISE_IN_DETAIL: f64 = 0.4;
