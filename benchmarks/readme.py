@@ -26,6 +26,7 @@ RECORDINGS = {
     "PIV DNS_turbulence_00001": "PIV, turbulence",
     "PIV backstep_Re800_00001": "PIV, backward step",
 }
+BOUNDARIES = {"Urban2": "Urban2", "Venus": "Venus", "Sintel cave_2 final": "Sintel cave_2"}
 FLOWS = {
     "OpenCV DIS medium": "OpenCV DIS medium",
     "OpenCV Farneback": "OpenCV Farneback",
@@ -97,6 +98,17 @@ def flow(record: Record) -> list[str]:
         found = [where(times, method=method, threads=1).get("milliseconds") for method in pairs]
         body.append([f"ms, {size}, one thread", *(number(each, 0) for each in found)])
     return lines(["", *FLOWS.values()], body)
+
+
+def intervals(record: Record) -> list[str]:
+    """Shares of 95 % intervals that hold on recordings, and normalised squared errors."""
+    rows = record.sections["Intervals on recordings"]
+    names = ("u", "v", "jacobian", "nees", "all")
+    body = []
+    for sample, name in (RECORDINGS | BOUNDARIES).items():
+        found = where(rows, sample=sample, preset="balanced", frames=2)
+        body.append([name, *(number(found.get(each), 2) for each in names)])
+    return lines(["", "u", "v", "Jacobian", "squared error / variance", "flow, all pixels"], body)
 
 
 def _both(row: dict[str, object], first: str, digits: int, second: str, more: int) -> str:
@@ -244,6 +256,7 @@ def parts(record: Record) -> list[str]:
 
 TABLES: dict[str, tuple[Callable[[Record], list[str]], tuple[str, ...]]] = {
     "flow": (flow, ("Accuracy on recordings",)),
+    "intervals": (intervals, ("Intervals on recordings",)),
     "tracking": (tracking, (HARD, "Tracking, recordings")),
     "particles": (particles, (SCENES, "Particle tracker, TUD-Campus", "Particle tracker, other recordings")),
     "stereo": (stereo, ("Disparity of edge pixels, scenes with exact truth",)),
