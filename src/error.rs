@@ -87,7 +87,7 @@ impl Error {
         Self::Argument { argument, expected: expected.into(), got: shortened(got.to_string()) }
     }
 
-    /// The same complaint about an argument of another name.
+    /// The same error about an argument of another name.
     pub(crate) fn about(self, argument: &'static str) -> Self {
         match self {
             Self::Argument { expected, got, .. } => Self::Argument { argument, expected, got },

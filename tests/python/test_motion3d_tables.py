@@ -16,7 +16,7 @@ from jacoflow import motion3d
 GAINS = (2, 3, 5, 6, 7, 8)
 """Rows of the table of scenes in which smoothed weights are worth a quarter of the error and more."""
 TRUSTED = {0: 0.9, 3: 0.8, 7: 0.95}
-"""Rows whose depths tell enough to trust the motion, and the share that is `ok` at least."""
+"""Rows whose depths are informative enough to trust the motion, and the share that is `ok` at least."""
 
 
 @pytest.mark.parametrize("case", range(len(scores.PRACTICAL)))

@@ -40,7 +40,7 @@ def test_the_bound_is_that_of_a_plain_computation():
 
 
 def test_maximum_likelihood_by_name_over_noisy_ground():
-    """It tells of itself how far it may be, with the epipole beside the points."""
+    """Its covariance holds its errors, with the epipole beside the points."""
     depth, name, n, noise_std, h, _ = scores.PRACTICAL[7]
     inside = []
     for seed in range(150):

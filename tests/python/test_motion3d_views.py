@@ -60,6 +60,6 @@ def test_displacements_are_predicted_in_pixels():
 
 @pytest.mark.parametrize("robust", [False, True])
 def test_covariances_hold_in_fast_turns(robust):
-    """The flow placed half way has ellipsoids of which none or hardly any hold (`claims.turning`)."""
+    """The flow placed half way has ellipsoids of which none or few hold (`claims.turning`)."""
     row = coverage.row("", (coverage.turns(seed, 0.25, robust) for seed in range(150)))
     assert row["ok"] > 120 and 0.88 <= row["ellipsoid"] <= 0.985 and row["median, deg"] < 0.9, row
