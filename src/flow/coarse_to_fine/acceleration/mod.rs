@@ -15,7 +15,8 @@ use super::planes::Planes;
 use super::pyramid::ComparedFrames;
 use super::refine::{RefineOptions, WindowStatistics, refine};
 use super::workspace::Workspace;
-use crate::flow::coarse_to_fine::descent::comparison::Comparison;
+use crate::flow::coarse_to_fine::descent::beside_boundaries;
+use crate::flow::coarse_to_fine::descent::comparison::{Comparison, replace};
 use crate::math::median;
 use crate::simd::SimdReal;
 
@@ -67,13 +68,16 @@ pub(super) fn to_middle_frame<T: SimdReal>(
             space.keep(planes);
         }
         statistics = chosen;
-        // Three frames have twice the occlusions of two, and objects may stop, start or turn back.
+        // Three frames have twice the occlusions of two, beside motion boundaries, and objects may stop,
+        // start or turn back.
         let (own, chosen) = refine(simd, space, &RefineOptions::default(), &next_step_motion, &data);
         chosen.into_iter().flat_map(WindowStatistics::into_planes).for_each(|planes| space.keep(planes));
         let level = &pyramid.levels()[finest];
         let (compared, follows_majority) = (ComparedFrames::Ahead, false);
-        Comparison { simd, level, compared, residual_std, follows_majority, pool, space }
-            .replace_where_better(motion, &own, 0.0);
+        let comparison = Comparison { simd, level, compared, residual_std, follows_majority, pool, space };
+        let mut wins = comparison.better_sites(motion, &own, 0.0);
+        wins.iter_mut().zip(beside_boundaries(simd, &own)).for_each(|(win, beside)| *win |= beside);
+        replace(motion, &own, &wins);
         space.keep(own);
     }
     for planes in [next_step_motion, data] {

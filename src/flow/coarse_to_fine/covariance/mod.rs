@@ -69,9 +69,9 @@ const REPEATED_NOISE_SHARE: f64 = 0.3;
 
 /// Variance of the flow and of its slopes, px^-2, over the scatter between frames with and without their
 /// finest detail that noise does not explain; and that of noise alone over its variance in the flow.
-const DETAIL_SHARES: [f64; 3] = [2.5, 0.0125, 0.0125];
+const DETAIL_SHARES: [f64; 3] = [4.7, 0.0235, 0.0235];
 /// Share of these on coarser levels, whose frames are smooth already.
-const COARSE_DETAIL_SHARE: f64 = 0.4;
+const COARSE_DETAIL_SHARE: f64 = 0.2;
 const NOISE_IN_DETAIL: f64 = 0.4;
 
 /// Minimum nodes of a parallel task.

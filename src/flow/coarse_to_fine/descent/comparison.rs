@@ -26,16 +26,24 @@ pub(in crate::flow::coarse_to_fine) struct Comparison<'a, T> {
 }
 
 impl<T: SimdReal> Comparison<'_, T> {
-    /// Replaces `motion` by `other` where they differ by more than `min_distance`, px of the level, and
-    /// `other` has less residual energy, blended beside such sites. Returns whether there are any.
+    /// Replaces `motion` by `other` where that is better ([`Comparison::better_sites`]), blended beside such
+    /// sites. Returns whether there are any.
     pub fn replace_where_better(&self, motion: &mut Planes<T>, other: &Planes<T>, min_distance: f64) -> bool {
+        let wins = self.better_sites(motion, other, min_distance);
+        replace(motion, other, &wins);
+        wins.contains(&true)
+    }
+
+    /// Whether both differ by more than `min_distance`, px of the level, and `other` has less residual
+    /// energy, row by row.
+    pub fn better_sites(&self, motion: &Planes<T>, other: &Planes<T>, min_distance: f64) -> Vec<bool> {
         let (known, found) = (self.residual_energies(motion), self.residual_energies(other));
         let mut sorted: Vec<f64> = known.iter().copied().filter(|energy| !energy.is_nan()).collect();
         let typical = median(&mut sorted).unwrap_or(0.0);
-        let size = (motion.width, motion.height);
+        let width = motion.width;
         let distance = |n: usize| {
             let [u, v] =
-                [0, 1].map(|k| (motion.at(k, n % size.0, n / size.0) - other.at(k, n % size.0, n / size.0)).to_f64());
+                [0, 1].map(|k| (motion.at(k, n % width, n / width) - other.at(k, n % width, n / width)).to_f64());
             u.hypot(v)
         };
         // Comparisons with NaN are false.
@@ -46,19 +54,7 @@ impl<T: SimdReal> Comparison<'_, T> {
         if self.follows_majority && 2 * wins.iter().filter(|&&win| win).count() > compared {
             wins.iter_mut().zip(&found).for_each(|(win, energy)| *win |= energy.is_nan());
         }
-        if !wins.contains(&true) {
-            return false;
-        }
-        for (x, y) in (0..size.1).flat_map(|y| (0..size.0).map(move |x| (x, y))) {
-            let share = share_around(&wins, size, (x, y));
-            if share > 0.0 {
-                for k in 0..MOTION {
-                    let value = &mut motion.line_mut(k, y)[x];
-                    *value += T::from_f64(share) * (other.at(k, x, y) - *value);
-                }
-            }
-        }
-        true
+        wins
     }
 
     /// Residual energy of a motion around each site, grey^2, row by row; NaN where too little is usable.
@@ -75,6 +71,23 @@ impl<T: SimdReal> Comparison<'_, T> {
         residual_energies.extend(rows.map(energy));
         self.space.keep(data);
         residual_energies
+    }
+}
+
+/// Replaces `motion` by `other` at the sites that win, blended beside them.
+pub(in crate::flow::coarse_to_fine) fn replace<T: SimdReal>(motion: &mut Planes<T>, other: &Planes<T>, wins: &[bool]) {
+    if !wins.contains(&true) {
+        return;
+    }
+    let size = (motion.width, motion.height);
+    for (x, y) in (0..size.1).flat_map(|y| (0..size.0).map(move |x| (x, y))) {
+        let share = share_around(wins, size, (x, y));
+        if share > 0.0 {
+            for k in 0..MOTION {
+                let value = &mut motion.line_mut(k, y)[x];
+                *value += T::from_f64(share) * (other.at(k, x, y) - *value);
+            }
+        }
     }
 }
 

@@ -25,6 +25,7 @@ use comparison::Comparison;
 use intermediate::refine_intermediate;
 use iteration::{Iteration, copy, has_settled};
 use std::ops::RangeInclusive;
+pub(super) use weighted_median::beside_boundaries;
 
 /// Levels from the coarse level down to the finest.
 const LEVELS_ABOVE: usize = 2;

@@ -4,8 +4,9 @@
 //! one frame contradicts both. Sites of one surface look alike: the median over a window, weighted by
 //! likeness of brightness and by the share of the residual that the motion explains, finds the motion of the
 //! site's own surface (D. Sun, S. Roth and M. J. Black, "A quantitative analysis of current practices in
-//! optical flow estimation and the principles behind them", IJCV 106, 2014). A site takes it only if it
-//! explains the pixels around the site better than the present motion; small objects therefore remain.
+//! optical flow estimation and the principles behind them", IJCV 106, 2014). A site takes it if
+//! it explains the pixels around the site, or explains them better than the present motion; small objects
+//! therefore remain.
 
 use crate::flow::coarse_to_fine::data_term::View;
 use crate::flow::coarse_to_fine::extended::Field;
@@ -28,7 +29,8 @@ const MIN_SECOND_DIFFERENCE: f64 = 1.5;
 const BRIGHTNESS_DIFFERENCE: f64 = 0.28;
 /// Residual, standard deviations, of which a motion explains half.
 const HALF_EXPLAINED_RESIDUAL: f64 = 2.0;
-/// Minimum gain in the explained share for which a site leaves its motion.
+/// Explained share, and gain in it, of which either is enough for a site to leave its motion.
+const SUFFICIENT_SHARE: f64 = 0.5;
 const MIN_GAIN: f64 = 0.05;
 /// Halvings of the range of a window's flow: the iteration that follows settles the rest.
 const HALVINGS: usize = 6;
@@ -58,8 +60,7 @@ pub(super) fn sharpen_boundaries<T: SimdReal>(
     motion: &mut Planes<T>,
 ) {
     let size = (motion.width, motion.height);
-    let boundaries = boundaries(simd, motion);
-    let sites = around(&boundaries, size);
+    let sites = beside_boundaries(simd, motion);
     if !sites.contains(&true) {
         return;
     }
@@ -81,6 +82,11 @@ pub(super) fn sharpen_boundaries<T: SimdReal>(
         dispatch(simd, Medians { along: &comparison, prepared: &prepared, sites: &sites, rows, out, stride });
     });
     Field::keep(space, [prepared]);
+}
+
+/// Whether a site lies beside a motion boundary, row by row.
+pub(in crate::flow::coarse_to_fine) fn beside_boundaries<T: SimdReal>(simd: Level, motion: &Planes<T>) -> Vec<bool> {
+    around(&boundaries(simd, motion), (motion.width, motion.height))
 }
 
 /// Whether the second difference of the flow along a row or column is large, row by row.
@@ -242,9 +248,10 @@ impl<T: SimdReal> Kernel<T> for Medians<'_, T> {
             }
             let medians = lanes.each_ref().map(|line| columns.iter().map(|&x| line[x]).collect::<Vec<T>>());
             let [_, explained] = along.sample::<V>(y, &columns, medians.each_ref().map(Vec::as_slice));
+            let (gain, sufficient) = (T::from_f64(MIN_GAIN), T::from_f64(SUFFICIENT_SHARE));
             let known = &prepared.line(EXPLAINED, y as isize)[LEFT..];
             for (i, &x) in columns.iter().enumerate() {
-                if known[x] + T::from_f64(MIN_GAIN) < explained[i] {
+                if explained[i] > (known[x] + gain).min(sufficient) {
                     (0..2).for_each(|k| out[k * stride + LEFT + x] = medians[k][i]);
                 }
             }
