@@ -124,7 +124,8 @@ fn the_car_ahead_has_the_time_to_contact_that_the_laser_has() {
         // The status of the first pair says that its standard deviation does not describe what is known.
         let is_described = known["status"] != "ill_conditioned";
         assert!(is_described || k == 0);
-        assert!(!is_described || deviation < 0.16 * laser, "{contact} {deviation}, laser: {laser}");
+        let most = if is_described { 0.16 } else { 0.7 };
+        assert!(deviation < most * laser, "{contact} {deviation}, laser: {laser}");
         assert!(number(alone, "time_to_contact_std") > 1.5 * deviation, "{alone:?}");
         assert!(!known["scene_status"].is_empty() && alone["scene_status"].is_empty());
     }

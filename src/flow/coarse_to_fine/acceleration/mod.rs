@@ -75,8 +75,8 @@ pub(super) fn to_middle_frame<T: SimdReal>(
         let level = &pyramid.levels()[finest];
         let (compared, follows_majority) = (ComparedFrames::Ahead, false);
         let comparison = Comparison { simd, level, compared, residual_std, follows_majority, pool, space };
-        let mut wins = comparison.better_sites(motion, &own, 0.0);
-        wins.iter_mut().zip(beside_boundaries(simd, &own)).for_each(|(win, beside)| *win |= beside);
+        let beside = beside_boundaries(simd, &own);
+        let wins = comparison.better_sites(motion, &own, 0.0, |n| beside[n]);
         replace(motion, &own, &wins);
         space.keep(own);
     }

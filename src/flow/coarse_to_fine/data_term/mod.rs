@@ -31,6 +31,7 @@ mod warp;
 #[cfg(test)]
 pub(super) use moments::SUMMARY;
 pub(super) use moments::{COUNT, ENERGY, ERROR, SEEN, UU, UV, VALID, VV, normal, right, summary};
+pub(super) use warp::is_usable;
 
 use super::planes::Planes;
 use crate::image::Spline;

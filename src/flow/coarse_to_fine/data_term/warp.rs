@@ -73,11 +73,15 @@ fn hide<T: SimdReal, V: Lanes<Scalar = T>>(mask: &Mask, x: V, y: V, seen: V) -> 
     y.store(ys);
     seen.store(kept);
     for l in 0..V::LANES {
-        let (column, row) = ((xs[l].to_f64() + 0.5) as usize, (ys[l].to_f64() + 0.5) as usize);
-        let usable = column < mask.width() && row < mask.height() && mask.get(column, row);
-        if !usable {
+        if !is_usable(mask, xs[l], ys[l]) {
             kept[l] = T::from_f64(0.0);
         }
     }
     V::load(kept)
+}
+
+/// Whether the pixel nearest to the position may be used.
+pub(in crate::flow::coarse_to_fine) fn is_usable<T: SimdReal>(mask: &Mask, x: T, y: T) -> bool {
+    let (column, row) = ((x.to_f64() + 0.5) as usize, (y.to_f64() + 0.5) as usize);
+    column < mask.width() && row < mask.height() && mask.get(column, row)
 }

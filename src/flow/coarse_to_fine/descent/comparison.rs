@@ -29,14 +29,20 @@ impl<T: SimdReal> Comparison<'_, T> {
     /// Replaces `motion` by `other` where that is better ([`Comparison::better_sites`]), blended beside such
     /// sites. Returns whether there are any.
     pub fn replace_where_better(&self, motion: &mut Planes<T>, other: &Planes<T>, min_distance: f64) -> bool {
-        let wins = self.better_sites(motion, other, min_distance);
+        let wins = self.better_sites(motion, other, min_distance, |_| false);
         replace(motion, other, &wins);
         wins.contains(&true)
     }
 
     /// Whether both differ by more than `min_distance`, px of the level, and `other` has less residual
-    /// energy, row by row.
-    pub fn better_sites(&self, motion: &Planes<T>, other: &Planes<T>, min_distance: f64) -> Vec<bool> {
+    /// energy, row by row; or whether `other` is `preferred` and can be compared with the frames.
+    pub fn better_sites(
+        &self,
+        motion: &Planes<T>,
+        other: &Planes<T>,
+        min_distance: f64,
+        preferred: impl Fn(usize) -> bool,
+    ) -> Vec<bool> {
         let (known, found) = (self.residual_energies(motion), self.residual_energies(other));
         let mut sorted: Vec<f64> = known.iter().copied().filter(|energy| !energy.is_nan()).collect();
         let typical = median(&mut sorted).unwrap_or(0.0);
@@ -49,7 +55,8 @@ impl<T: SimdReal> Comparison<'_, T> {
         // Comparisons with NaN are false.
         let better =
             |n: usize| MIN_ENERGY_RATIO * (found[n] + typical) < known[n] + typical && distance(n) > min_distance;
-        let mut wins: Vec<bool> = (0..known.len()).map(better).collect();
+        let is_preferred = |n: usize| preferred(n) && !found[n].is_nan();
+        let mut wins: Vec<bool> = (0..known.len()).map(|n| is_preferred(n) || better(n)).collect();
         let compared = known.iter().zip(&found).filter(|(a, b)| !a.is_nan() && !b.is_nan()).count();
         if self.follows_majority && 2 * wins.iter().filter(|&&win| win).count() > compared {
             wins.iter_mut().zip(&found).for_each(|(win, energy)| *win |= energy.is_nan());

@@ -8,7 +8,7 @@
 //! it explains the pixels around the site, or explains them better than the present motion; small objects
 //! therefore remain.
 
-use crate::flow::coarse_to_fine::data_term::View;
+use crate::flow::coarse_to_fine::data_term::{View, is_usable};
 use crate::flow::coarse_to_fine::extended::Field;
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::{LEFT, Planes, SITE_SPACING};
@@ -177,6 +177,11 @@ impl<T: SimdReal> Along<'_, T> {
                 view.spline.sample_row_in::<V>(&xs, &ys, &mut sample);
                 let (mean, rate) = (view.mean * self.per_picture, view.rate * self.per_residual);
                 residual.iter_mut().zip(&sample).for_each(|(sum, sample)| *sum += rate * *sample);
+                // No motion explains what is not seen.
+                if let Some(mask) = view.usable {
+                    let hidden = |i: usize| !is_usable(mask, xs[i], ys[i]);
+                    (0..columns.len()).filter(|&i| hidden(i)).for_each(|i| residual[i] = T::from_f64(f64::INFINITY));
+                }
                 if n == 0 {
                     brightness.iter_mut().zip(&sample).for_each(|(sum, sample)| *sum += mean * *sample);
                 }
