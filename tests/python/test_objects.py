@@ -106,6 +106,6 @@ def test_what_is_masked_explains_no_motion():
         rng = np.random.default_rng(seed)
         surface = texture(rng)
         frames = [(np.roll(surface, (2 * time, 6 * time), (0, 1)) + rng.standard_normal(surface.shape)).astype(np.float32) for time in (-1, 0, 1)]
-        field = jacoflow.estimate(frames, covariance=False, mask=seen, preset="accurate")
+        field = jacoflow.estimate(frames, covariance=False, mask=seen, **grouped(preset="accurate"))
         errors.append(np.hypot(field.u - 6, field.v - 2)[seen].mean())
     assert np.mean(errors) < 0.3, errors
