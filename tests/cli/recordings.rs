@@ -120,12 +120,7 @@ fn the_car_ahead_has_the_time_to_contact_that_the_laser_has() {
         let laser = 0.5 * (ranges[k] + ranges[k + 1]) / closing;
         let (contact, deviation) = (number(known, "time_to_contact"), number(known, "time_to_contact_std"));
         off.push(((contact - laser) / deviation).abs());
-        assert!(off[k] < 1.5, "{contact} {deviation}, laser: {laser}");
-        // The status of the first pair says that its standard deviation does not describe what is known.
-        let is_described = known["status"] != "ill_conditioned";
-        assert!(is_described || k == 0);
-        let most = if is_described { 0.16 } else { 0.7 };
-        assert!(deviation < most * laser, "{contact} {deviation}, laser: {laser}");
+        assert!(off[k] < 1.5 && deviation < 0.17 * laser, "{contact} {deviation}, laser: {laser}");
         assert!(number(alone, "time_to_contact_std") > 1.5 * deviation, "{alone:?}");
         assert!(!known["scene_status"].is_empty() && alone["scene_status"].is_empty());
     }
