@@ -15,6 +15,7 @@ use super::planes::Planes;
 use super::pyramid::ComparedFrames;
 use super::refine::{RefineOptions, WindowStatistics, refine};
 use super::workspace::Workspace;
+use crate::ablation::keeps;
 use crate::flow::coarse_to_fine::descent::beside_boundaries;
 use crate::flow::coarse_to_fine::descent::comparison::{Comparison, replace};
 use crate::math::median;
@@ -75,8 +76,8 @@ pub(super) fn to_middle_frame<T: SimdReal>(
         let level = &pyramid.levels()[finest];
         let (compared, follows_majority) = (ComparedFrames::Ahead, false);
         let comparison = Comparison { simd, level, compared, residual_std, follows_majority, pool, space };
-        let beside = beside_boundaries(simd, &own);
-        let wins = comparison.better_sites(motion, &own, 0.0, |n| beside[n]);
+        let (beside, prefers) = (beside_boundaries(simd, &own), keeps("flow.last_two_frames"));
+        let wins = comparison.better_sites(motion, &own, 0.0, |n| beside[n] && prefers);
         replace(motion, &own, &wins);
         space.keep(own);
     }

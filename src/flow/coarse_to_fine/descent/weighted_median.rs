@@ -8,6 +8,7 @@
 //! it explains the pixels around the site, or explains them better than the present motion; small objects
 //! therefore remain.
 
+use crate::ablation::keeps;
 use crate::flow::coarse_to_fine::data_term::{View, is_usable};
 use crate::flow::coarse_to_fine::extended::Field;
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
@@ -253,7 +254,8 @@ impl<T: SimdReal> Kernel<T> for Medians<'_, T> {
             }
             let medians = lanes.each_ref().map(|line| columns.iter().map(|&x| line[x]).collect::<Vec<T>>());
             let [_, explained] = along.sample::<V>(y, &columns, medians.each_ref().map(Vec::as_slice));
-            let (gain, sufficient) = (T::from_f64(MIN_GAIN), T::from_f64(SUFFICIENT_SHARE));
+            let sufficient = if keeps("flow.sufficient_median") { SUFFICIENT_SHARE } else { f64::INFINITY };
+            let (gain, sufficient) = (T::from_f64(MIN_GAIN), T::from_f64(sufficient));
             let known = &prepared.line(EXPLAINED, y as isize)[LEFT..];
             for (i, &x) in columns.iter().enumerate() {
                 if explained[i] > (known[x] + gain).min(sufficient) {
