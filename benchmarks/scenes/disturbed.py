@@ -92,9 +92,9 @@ def shifted_speckle(seed: int, shift: tuple[int, int]) -> list[Array]:
     return [speckle[110:510, 110:510], speckle[110 - v : 510 - v, 110 - u : 510 - u]]
 
 
-def layered(seed: int) -> tuple[list[Array], Array, Array]:
-    """A disc that moves before a ground at rest, both faintly textured; with the flow of the first frame and the
-    pixels within 10 px of the boundary that both frames show."""
+def layered(seed: int, count: int = 2) -> tuple[list[Array], Array, Array]:
+    """A disc that moves before a ground at rest, both faintly textured: two frames, or three with one before; with
+    the flow of the last frame but one and the pixels within 10 px of the boundary that it and the last show."""
     y, x = np.indices(SIZE).astype(float)
     middle, radius, move = (SIZE[1] / 2 - 3, SIZE[0] / 2), 55.0, (6.0, 2.0)
     ground, disc = 80 + 6 * texture(seed), 140 + 6 * texture(seed + 100)
@@ -112,7 +112,7 @@ def layered(seed: int) -> tuple[list[Array], Array, Array]:
     on_disc = distance(0) < 0
     flow = np.where(on_disc[..., None], move, 0.0)
     near = (np.abs(distance(0)) < 10) & (on_disc | (distance(1) > 0.5)) & (np.abs(distance(0)) > 1)
-    return [frame(0), frame(1)], flow, near
+    return [frame(time) for time in range(2 - count, 2)], flow, near
 
 
 WAVES = 400
