@@ -60,7 +60,9 @@ impl Threads {
 
     /// Runs `work` where rayon's parallel iterators use exactly this many threads.
     pub fn install<R: Send>(self, work: impl FnOnce() -> R + Send) -> R {
-        pool(self.count()).install(work)
+        let (mut work, mut result) = (Some(work), None);
+        install(self.count(), &mut || result = work.take().map(|work| work()));
+        result.expect("the pool has run the work")
     }
 }
 
@@ -69,6 +71,11 @@ fn from_environment(value: Option<OsString>) -> Result<Option<usize>> {
     let Some(value) = value.filter(|value| !value.is_empty()) else { return Ok(None) };
     let number = value.to_str().and_then(|text| text.trim().parse().ok()).filter(|&n: &usize| n > 0);
     number.map(Some).ok_or_else(|| Error::argument(VARIABLE, "a positive integer", value.display()))
+}
+
+/// Behind a pointer, as rayon would compile all that is done inside several times over.
+fn install(threads: usize, work: &mut (dyn FnMut() + Send)) {
+    pool(threads).install(work);
 }
 
 /// The shared pool of `count` threads; made on first use and kept.
@@ -156,6 +163,14 @@ pub(crate) fn for_each_band_of<T: Send>(
     row_len: usize,
     work: impl Fn(usize, std::ops::Range<usize>, &mut [T]) + Sync,
 ) {
+    in_bands(band_rows, buffer, row_len, &work);
+}
+
+/// Work on a band of rows: its number, the rows and their values.
+type BandWork<'a, T> = dyn Fn(usize, std::ops::Range<usize>, &mut [T]) + Sync + 'a;
+
+/// Behind a pointer for the same reason as [`install`].
+fn in_bands<T: Send>(band_rows: usize, buffer: &mut [T], row_len: usize, work: &BandWork<'_, T>) {
     if row_len == 0 {
         return;
     }
