@@ -39,8 +39,7 @@ fn a_robust_search_shows_what_else_many_points_share() {
     }
 }
 
-/// Points of a moving object that fit the scene's motion by chance lie together and pull the same way: with a
-/// slow
+/// Points of a moving object that fit the scene's motion by chance lie together and pull the same way: with a slow
 /// mover that is not seen in their residuals.
 #[test]
 fn a_slow_mover_is_found_or_reported() {
@@ -60,37 +59,33 @@ fn a_slow_mover_is_found_or_reported() {
     assert!(silent <= 2, "{silent}");
 }
 
-/// A disc of 30 % of the points moves by itself, in noise of a tenth of the flow: with the rest of the scene
-/// it may fit a third motion, at which every search ends. The residuals there are little larger than noise,
-/// but those of a part pull another way, and two motions explain the points better.
+/// A disc of 30 % of the points moves by itself, in unknown noise of a tenth of the flow: with the rest of the
+/// scene it may fit a third motion, at which every search ends. The residuals there are little larger than
+/// noise, but those of a part pull another way, and two motions explain the points better.
 #[test]
 fn what_an_object_and_the_scene_share_together_is_not_trusted() {
-    let (noise_std, mut wrong) = (1e-3, 0);
-    for noise in [Noise::StandardDeviation(noise_std), Noise::Unknown, Noise::StandardDeviation(0.5 * noise_std)] {
-        let mut trusted = 0;
-        for seed in 0..40 {
-            let rng = CounterRng::new(seed).stream(7);
-            let normal = |j: u64| std::array::from_fn(|i| rng.normal(3 * j + i as u64));
-            let w = normal(1).map(|value: f64| 0.01 * value);
-            let (camera, by_itself) = (Motion::new(normal(0), w), normal(2).map(|value: f64| 0.005 * value));
-            let moving = Motion::new(normal(3), std::array::from_fn(|i| w[i] + by_itself[i]));
-            let mut scene = Scene::new(camera, 600, 0.45, noise_std, seed, |x, y, _| 0.01 * smooth(x, y));
-            let thing = Scene::new(moving, 600, 0.45, noise_std, seed, |_, _, _| 0.012);
-            let middle = [0.2 * rng.normal(50), 0.2 * rng.normal(51)];
-            let away = |k: usize| (scene.points[k][0] - middle[0]).hypot(scene.points[k][1] - middle[1]);
-            let mut nearest: Vec<usize> = (0..600).collect();
-            nearest.sort_by(|&a, &b| away(a).total_cmp(&away(b)));
-            for &k in &nearest[..180] {
-                scene.flow[k] = thing.flow[k];
-            }
-            let found = estimate_motion(&scene.flow(), &noise, &options()).unwrap();
-            if found.status == Status::Ok {
-                let off = found.motion.angle_to(&camera).to_degrees();
-                trusted += 1;
-                wrong += u32::from(off > 15.0 && off > 4.0 * found.direction_std);
-            }
+    let (noise_std, mut trusted, mut wrong) = (1e-3, 0, 0);
+    for seed in 0..40 {
+        let rng = CounterRng::new(seed).stream(7);
+        let normal = |j: u64| std::array::from_fn(|i| rng.normal(3 * j + i as u64));
+        let w = normal(1).map(|value: f64| 0.01 * value);
+        let (camera, by_itself) = (Motion::new(normal(0), w), normal(2).map(|value: f64| 0.005 * value));
+        let moving = Motion::new(normal(3), std::array::from_fn(|i| w[i] + by_itself[i]));
+        let mut scene = Scene::new(camera, 600, 0.45, noise_std, seed, |x, y, _| 0.01 * smooth(x, y));
+        let object = Scene::new(moving, 600, 0.45, noise_std, seed, |_, _, _| 0.012);
+        let middle = [0.2 * rng.normal(50), 0.2 * rng.normal(51)];
+        let away = |k: usize| (scene.points[k][0] - middle[0]).hypot(scene.points[k][1] - middle[1]);
+        let mut nearest: Vec<usize> = (0..600).collect();
+        nearest.sort_by(|&a, &b| away(a).total_cmp(&away(b)));
+        for &k in &nearest[..180] {
+            scene.flow[k] = object.flow[k];
         }
-        assert!(trusted >= 4, "{noise:?}: {trusted}");
+        let found = estimate_motion(&scene.flow(), &Noise::Unknown, &options()).unwrap();
+        if found.status == Status::Ok {
+            let off = found.motion.angle_to(&camera).to_degrees();
+            trusted += 1;
+            wrong += u32::from(off > 15.0 && off > 4.0 * found.direction_std);
+        }
     }
-    assert!(wrong <= 2, "{wrong}");
+    assert!(trusted >= 4 && wrong <= 1, "{wrong} of {trusted}");
 }

@@ -16,7 +16,7 @@ import jacoflow
 from benchmarks.scenes import motion3d as motion3d_scenes
 from benchmarks.scenes import stereo as stereo_scenes
 from conftest import METHODS
-from jacoflow import mixture, motion3d, scenes, stereo, track
+from jacoflow import motion3d, scenes, stereo, track
 
 PATIENCE = 100.0
 """Seconds after which a child that has not answered is ended: a test that fails must end, too."""
@@ -180,7 +180,7 @@ def moved_before_a_field(patches):
 
 def mixed():
     points = np.random.default_rng(1).normal(size=(20000, 3)) + np.arange(20000)[:, None] % 3 * 5
-    fitted = mixture.VariationalGaussianMixture(4, max_iter=20, random_state=1).fit(points)
+    fitted = jacoflow.mixture.VariationalGaussianMixture(4, max_iter=20, random_state=1).fit(points)
     return fitted.means_, fitted.score_samples(points)
 
 

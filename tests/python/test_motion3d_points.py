@@ -190,13 +190,18 @@ def test_covariances_hold_where_they_are_hard_to_state(name):
     assert row["ok"] >= HARD[name] and row["wrong"] <= 2 and 0.87 <= row["ellipsoid"] <= 0.98, row
 
 
-@pytest.mark.parametrize("robust", [False, True])
-def test_what_is_said_of_scenes_by_chance_holds(robust):
+def test_what_is_said_of_scenes_by_chance_holds():
     """No published scene among them."""
-    rows = {row["scenes"]: row for row in honesty.table(1200, robust)}
+    rows = {row["scenes"]: row for row in honesty.table(1200)}
     assert rows["all"]["ok"] > 1000 and rows["all"]["wrong"] <= 3
     for row in rows.values():
         assert 0.9 < row["holds"] < 0.97, row
+
+
+def test_a_robust_search_says_as_much_of_scenes_by_chance():
+    """So few are not counted by class; `benchmarks.tables.motion3d_honesty --robust` has thousands."""
+    *_, everything = honesty.table(300, robust=True)
+    assert everything["ok"] > 250 and everything["wrong"] == 0 and everything["holds"] > 0.9, everything
 
 
 def test_times_on_the_sphere_times_the_bearings_z_reach_the_camera_plane():

@@ -43,7 +43,7 @@ def crossing_on_paper(seed):
     return np.mean([[scores.purity(), *(scores.recall(label) for label in (1, 2, 3)), *(scores.path(label) for label in (1, 2, 3))] for scores in each], axis=0)
 
 
-CROSSINGS = (1, 22, 24)
+CROSSINGS = (1, 22)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_a_missing_pair_changes_no_name(scene):
     assert scores.id_share(1) == 1.0 and scores.id_share(2) == 1.0
 
 
-@pytest.mark.parametrize(("scene", "seeds"), [(crossing_by_chance, (0, 1, 2, 3)), (passing_by_chance, (0, 3, 7))])
+@pytest.mark.parametrize(("scene", "seeds"), [(crossing_by_chance, (0, 1)), (passing_by_chance, (0, 3))])
 def test_who_was_hidden_is_recognised_in_sequences_by_chance(scene, seeds):
     back = []
     for seed in seeds:
@@ -81,7 +81,7 @@ def test_who_was_hidden_is_recognised_in_sequences_by_chance(scene, seeds):
         assert scores.purity() >= 0.96
         assert np.mean([scores.id_share(label) for label in labels(drawn)]) >= 0.9
     # Now and then a track goes to a part of who comes to light.
-    assert len(back) >= 3 and sum(map(bool, back)) >= 0.75 * len(back)
+    assert len(back) >= 2 and sum(map(bool, back)) >= 0.75 * len(back)
 
 
 EXPOSURES = {
@@ -113,7 +113,7 @@ def test_what_drifts_through_layers_of_depth_keeps_its_track(disparity, approach
     layers = (wall(160, 120, 0, -14, 0, 28), Layer("box", 1, (100, 120), (speed, 0.2), disparity, approach, (36, 50), 14))
     drifting = Scene("drifting", layers, 12, 0.0, 21, (320, 240), (-20, 12))
     sequence = drifting.sequence()
-    for start in range(4):
+    for start in range(2):
         tracker = StereoTracker(disparity_range=drifting.disparity_range, random_state=start)
         scores = follow(drifting, sequence, tracker, False)[0]
         assert scores.id_share(1) == 1.0 and scores.recall(1) > 0.98

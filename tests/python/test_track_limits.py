@@ -54,8 +54,7 @@ def normalised_squares(scene):
     return (errors**2 / found.covariance[:, :, 0, 0]).sum(axis=1)[(found.status == "tracking") & (np.arange(len(found)) > 2)]
 
 
-@pytest.mark.parametrize("noise", [2.0, 8.0])
-@pytest.mark.parametrize("degrees", [0.0, 2.0, 3.0])
+@pytest.mark.parametrize(("degrees", "noise"), [(0.0, 2.0), (2.0, 8.0), (3.0, 2.0)])
 def test_stated_covariances_of_large_targets_hold_what_they_say(degrees, noise):
     """Corners that turn out of the upright box are not background; noise in the template stays from frame to frame, and no filter takes it away."""
     squares = [
@@ -145,7 +144,7 @@ def test_a_target_that_goes_along_a_low_wall_keeps_its_size(side):
     assert (overlap > 0.5).all() and overlap[-10:].mean() > 0.8
 
 
-FENCES = [(21.0, 8.0, 4.0, 1, 0.65), (21.0, 12.0, 6.0, 1, 0.65), (45.0, 8.0, 4.0, 1, 0.5), (31.0, 12.0, 6.0, 0, 0.9), (31.0, 6.0, 6.0, 0, 0.9), (13.0, 12.0, 6.0, 0, 0.7), (13.0, 6.0, 6.0, 0, 0.5)]
+FENCES = [(21.0, 12.0, 6.0, 1, 0.65), (45.0, 8.0, 4.0, 1, 0.5), (31.0, 12.0, 6.0, 0, 0.9), (13.0, 12.0, 6.0, 0, 0.7)]
 """Side of a target, gaps and bars of a fence, px, whether it is 2.3 px farther on and the target .3 px/frame slower, and least mean success."""
 
 
