@@ -83,7 +83,7 @@ impl Schedule {
                 tolerance: [finest_tolerance, 0.023],
                 smoothness: Smoothness { sweeps: 4, break_strain: 0.14, ..smoothness },
                 finest_sweeps,
-                finest_sharpened: 1,
+                finest_sharpened: 2,
                 searches: true,
                 trial_from: Some(2),
                 refines_intermediate: true,
