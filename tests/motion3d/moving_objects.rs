@@ -39,8 +39,8 @@ fn a_robust_search_shows_what_else_many_points_share() {
     }
 }
 
-/// Points of a moving object that fit the scene's motion by chance lie together and pull the same way: with a slow
-/// mover that is not seen in their residuals.
+/// Points of a moving object that fit the scene's motion by chance lie together and pull the same way: with a
+/// slow mover that is not seen in their residuals.
 #[test]
 fn a_slow_mover_is_found_or_reported() {
     let (camera, aside) = (Motion::new([0.6, 0.2, 0.75], [0.01, -0.015, 0.005]), [-0.8, 0.1, 0.3]);
@@ -59,9 +59,9 @@ fn a_slow_mover_is_found_or_reported() {
     assert!(silent <= 2, "{silent}");
 }
 
-/// A disc of 30 % of the points moves by itself, in unknown noise of a tenth of the flow: with the rest of the
-/// scene it may fit a third motion, at which every search ends. The residuals there are little larger than
-/// noise, but those of a part pull another way, and two motions explain the points better.
+/// A disc of 30 % of the points moves by itself, in unknown noise of a tenth of the flow: with the rest of
+/// the scene it may fit a third motion, at which every search ends. The residuals there are little larger
+/// than noise, but those of a part pull another way, and two motions explain the points better.
 #[test]
 fn what_an_object_and_the_scene_share_together_is_not_trusted() {
     let (noise_std, mut trusted, mut wrong) = (1e-3, 0, 0);
