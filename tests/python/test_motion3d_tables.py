@@ -91,7 +91,7 @@ PIXELS = (1, 3, 6, 7, 10)
 
 @pytest.mark.parametrize("case", PIXELS)
 def test_two_views_in_pixels_are_as_published(case):
-    """Medians and rms of both estimators no more than a fifth above those of the published 24 trials, of which three are beyond what theory allows, and no less than what so few trials may differ by."""
+    """Medians and rms of both estimators no more than a fifth above those of the published 24 trials, and no less than what so few trials may differ by."""
     *errors, figures = errors_in_pixels(case, 96)
     for name, values, (median, root) in zip(("ML", "efficient"), errors, figures, strict=True):
         for what, got, asked in (("median", np.median(values), median), ("rms", scores.rms(values), root)):
