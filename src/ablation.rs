@@ -23,6 +23,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("flow.weighted_median", "beside motion boundaries a weighted median of the flow is tried"),
     ("flow.sufficient_median", "a median that explains half of the residual is taken without a gain"),
     ("flow.last_two_frames", "beside motion boundaries three frames take the motion of the last two"),
+    ("flow.variational_refinement", "the flow of pixels moves where that explains the frames better than windows do"),
     ("flow.boundary_error", "jumps of the motion nearby widen the covariance"),
     ("flow.detail_bias", "motion that the finest detail of the frames contradicts over wide windows is moved"),
     ("flow.detail_scatter", "differences with and without the finest detail widen the covariance"),

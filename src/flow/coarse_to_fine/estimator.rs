@@ -63,7 +63,9 @@ impl CoarseToFine {
             let mut estimate = estimate(&plan, found, (frames.len() == 3, self.options.central), &mut workspace);
             estimate.noise_gain = noise_gain;
             let covariance_of = field.covariance.is_some().then(|| output::covariance_of(&estimate, frames, common));
-            output::fill((&estimate, covariance_of), &workspace.space, frames, common, field);
+            let refines = plan.schedule.refines_pixels && plan.finest == 0 && keeps("flow.variational_refinement");
+            let views = refines.then(|| workspace.pyramid.levels()[0].views_at_reference(self.options.central));
+            output::fill((&estimate, covariance_of), &workspace.space, views, frames, common, field);
             estimate.recycle(&workspace);
             self.store.put_back(workspace);
         });

@@ -12,7 +12,8 @@
 //!    three frames are warped by the result and refined once more. 4. [`peak_locking`], [`detail_bias`]:
 //!    measure and remove the bias of undersampled texture. 5. [`acceleration`]: three frames only; from the
 //!    mean of both steps to the step after the middle frame. 6. [`covariance`]: error sources measured in the
-//!    same frames. 7. [`output`]: the field at the requested sites, with status and diagnostics.
+//!    same frames. 7. [`output`]: the field at the requested sites, with status and diagnostics, its flow
+//!    first refined at every pixel by [`variational`].
 //!
 //! [`estimator`] runs the stages, [`schedule`] says how much work each level gets, [`estimate`] is what the
 //! stages leave for covariance and output. [`planes`], [`extended`], [`plane_pool`] and [`workspace`] hold
@@ -45,6 +46,7 @@ mod refine;
 mod regularize;
 mod resample;
 mod schedule;
+mod variational;
 mod workspace;
 
 pub(super) use estimator::CoarseToFine;

@@ -41,6 +41,19 @@ impl<T: SimdReal> PyramidLevel<T> {
         self.views_of(&self.splines, compared)
     }
 
+    /// The frame whose pixels the motion belongs to and the next; for `central` motion of a triple, the
+    /// frames on either side.
+    pub fn views_at_reference(&self, central: bool) -> Vec<View<'_, T>> {
+        let (before, after) = match self.splines.len() {
+            2 => (0, 1),
+            _ if central => (0, 2),
+            _ => (1, 2),
+        };
+        let (splines, usable) = (&self.splines, |k: usize| self.usable[k].as_ref());
+        let (splines, usable) = ([&splines[before], &splines[after]], [usable(before), usable(after)]);
+        if after - before == 2 { View::around(splines, usable).to_vec() } else { View::ahead(splines, usable).to_vec() }
+    }
+
     /// As [`PyramidLevel::views`], of other splines of the frames.
     pub fn views_of<'a>(&'a self, splines: &'a [Spline<T>], compared: ComparedFrames) -> Vec<View<'a, T>> {
         let usable = |k: usize| self.usable[k].as_ref();

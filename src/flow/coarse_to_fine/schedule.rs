@@ -27,6 +27,8 @@ pub(super) struct Schedule {
     /// Whether the motion one level above the finest is refined before it is carried down, for less noise.
     /// Not at half resolution, where that level has too few sites to choose windows.
     pub refines_intermediate: bool,
+    /// Whether the flow is refined at every pixel.
+    pub refines_pixels: bool,
 }
 
 /// Maximum size, pixels, of a level whose cost is negligible.
@@ -75,6 +77,7 @@ impl Schedule {
                 searches: false,
                 trial_from: None,
                 refines_intermediate: false,
+                refines_pixels: false,
             },
             Preset::Balanced => Self {
                 finest_level: 0,
@@ -87,6 +90,7 @@ impl Schedule {
                 searches: true,
                 trial_from: Some(2),
                 refines_intermediate: true,
+                refines_pixels: true,
             },
             Preset::Accurate => Self {
                 finest_level: 0,
@@ -100,6 +104,7 @@ impl Schedule {
                 searches: true,
                 trial_from: Some(2),
                 refines_intermediate: true,
+                refines_pixels: true,
             },
         }
     }

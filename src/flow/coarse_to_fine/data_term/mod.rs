@@ -31,7 +31,7 @@ mod warp;
 #[cfg(test)]
 pub(super) use moments::SUMMARY;
 pub(super) use moments::{COUNT, ENERGY, ERROR, SEEN, UU, UV, VALID, VV, normal, right, summary};
-pub(super) use warp::is_usable;
+pub(super) use warp::{is_usable, sample_views};
 
 use super::planes::Planes;
 use crate::image::Spline;
@@ -88,6 +88,12 @@ impl<'a, T: SimdReal> View<'a, T> {
     /// Two frames at the time of the first one, whose pixels the motion then belongs to.
     pub fn ahead(splines: [&'a Spline<T>; 2], usable: [Option<&'a Mask>; 2]) -> [Self; 2] {
         let parts = [(0.0, 0.5, -1.0), (1.0, 0.5, 1.0)];
+        std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
+    }
+
+    /// Two frames, one frame before and after the motion's time.
+    pub fn around(splines: [&'a Spline<T>; 2], usable: [Option<&'a Mask>; 2]) -> [Self; 2] {
+        let parts = [(-1.0, 0.5, -0.5), (1.0, 0.5, 0.5)];
         std::array::from_fn(|k| Self::new(splines[k], usable[k], parts[k]))
     }
 

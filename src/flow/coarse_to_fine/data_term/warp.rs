@@ -12,13 +12,12 @@ const MAX_LANES: usize = 16;
 #[inline(always)]
 pub(super) fn warp_row<T: SimdReal, V: Lanes<Scalar = T>>(
     views: &[View<'_, T>],
-    ((width, height), y): ((usize, usize), usize),
+    (size, y): ((usize, usize), usize),
     columns: &Columns,
     frame: &[T],
     image: &mut [T],
 ) {
     let row = V::constant(y as f64);
-    let (right, low) = (V::constant(width as f64 - 2.0), V::constant(height as f64 - 2.0));
     for h in 0..2 {
         let n = columns.count;
         let (number, inside) = (&frame[columns.samples(0, h)][..n], &frame[columns.samples(1, h)][..n]);
@@ -26,25 +25,38 @@ pub(super) fn warp_row<T: SimdReal, V: Lanes<Scalar = T>>(
         let mut at = 0;
         while at + V::LANES <= n {
             let (u, v, column) = (V::load(&u[at..]), V::load(&v[at..]), V::load(&number[at..]));
-            let mut seen = V::load(&inside[at..]);
-            let (mut a, mut r) = (V::zero(), V::zero());
-            for view in views {
-                let time = V::splat(view.time);
-                let (x, y) = (u.mul_add(time, column), v.mul_add(time, row));
-                seen = within(x, right, within(y, low, seen));
-                if let Some(mask) = view.usable {
-                    seen = hide(mask, x, y, seen);
-                }
-                let w = view.spline.sample_in(x, y);
-                a = w.mul_add(V::splat(view.mean), a);
-                r = w.mul_add(V::splat(view.rate), r);
-            }
+            let [a, r, seen] = sample_views(views, size, [column, row], [u, v], V::load(&inside[at..]));
             a.store(&mut mean[at..]);
             r.store(&mut rate[at..]);
             seen.store(&mut valid[at..]);
             at += V::LANES;
         }
     }
+}
+
+/// Mean and rate of the views at positions moved by `flow`, and `seen` where every view is usable, else 0.
+#[inline(always)]
+pub(in crate::flow::coarse_to_fine) fn sample_views<T: SimdReal, V: Lanes<Scalar = T>>(
+    views: &[View<'_, T>],
+    (width, height): (usize, usize),
+    position: [V; 2],
+    flow: [V; 2],
+    mut seen: V,
+) -> [V; 3] {
+    let (right, low) = (V::constant(width as f64 - 2.0), V::constant(height as f64 - 2.0));
+    let (mut mean, mut rate) = (V::zero(), V::zero());
+    for view in views {
+        let time = V::splat(view.time);
+        let (x, y) = (flow[0].mul_add(time, position[0]), flow[1].mul_add(time, position[1]));
+        seen = within(x, right, within(y, low, seen));
+        if let Some(mask) = view.usable {
+            seen = hide(mask, x, y, seen);
+        }
+        let brightness = view.spline.sample_in(x, y);
+        mean = brightness.mul_add(V::splat(view.mean), mean);
+        rate = brightness.mul_add(V::splat(view.rate), rate);
+    }
+    [mean, rate, seen]
 }
 
 #[inline(always)]

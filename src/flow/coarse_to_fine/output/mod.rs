@@ -3,20 +3,23 @@
 mod consistency;
 
 use super::covariance::{CovarianceMap, CovarianceMaps, Energy, covariance};
-use super::data_term::{DataOptions, ENERGY, MOTION, UU, UV, VV};
+use super::data_term::{DataOptions, ENERGY, MOTION, UU, UV, VV, View};
 use super::estimate::Estimate;
 use super::plane_pool::PlanePool;
 use super::planes::{Planes, SITE_SPACING};
 use super::refine::{SITES_PER_NODE, WindowStatistics};
 use super::resample::{finer, motion_at};
+use super::variational::PixelMotion;
 use crate::flow::coarse_to_fine::{resample::first_frame::at_first_frame, resample::rows::RowReader};
 use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{FieldBand, bands};
+use crate::flow::symmetric::upper;
 use crate::image::{are_rounded, halved_noise, halved_size};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::{FlowField, Frame, Mask, SamplingGrid, Status};
 use consistency::Consistency;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Sum of the squared weights of a data term's rows: one of brightness, two of its gradient.
 fn rows() -> f64 {
@@ -46,6 +49,7 @@ pub(super) fn covariance_of<T: SimdReal>(
 pub(super) fn fill<T: SimdReal>(
     (estimate, spreads): (&Estimate<T>, Option<CovarianceMaps<T>>),
     space: &PlanePool<T>,
+    views: Option<Vec<View<'_, T>>>,
     frames: &[&Frame<T>],
     common: &EstimatorOptions,
     field: &mut FlowField<T>,
@@ -54,12 +58,15 @@ pub(super) fn fill<T: SimdReal>(
     let moved = (frames.len() == 2).then(|| at_first_frame(simd, space, &estimate.motion));
     let found = moved.as_ref().unwrap_or(&estimate.motion);
     let full = at_full_resolution(simd, space, (estimate.level, found), frames[0].size());
+    let contrast = estimate.brightness.contrast;
+    let pixels = views.map(|views| PixelMotion::new(simd, space, (&views, contrast), found, frames[0].size()));
     let writer = Writer {
         simd,
         pitch: 2 << estimate.level,
         data: &estimate.data,
         per_row: 1.0 / (rows().sqrt() * estimate.brightness.gain),
         motion: full.as_ref().unwrap_or(found),
+        pixels: pixels.as_ref(),
         reference: frames[frames.len() - 2],
         mask: common.mask.as_ref(),
         observable: is_observable(estimate),
@@ -75,6 +82,9 @@ pub(super) fn fill<T: SimdReal>(
         }
     });
     moved.into_iter().chain(full).for_each(|planes| space.keep(planes));
+    if let Some(pixels) = pixels {
+        pixels.recycle(space);
+    }
 }
 
 /// Motion on the sites of the frame, if estimated on a coarser level.
@@ -108,6 +118,8 @@ struct Writer<'a, T: Clone> {
     /// Factor from the root of the residual energy to grey levels.
     per_row: f64,
     motion: &'a Planes<T>,
+    /// The same at every pixel, if refined there.
+    pixels: Option<&'a PixelMotion<T>>,
     reference: &'a Frame<T>,
     mask: Option<&'a Mask>,
     observable: bool,
@@ -119,15 +131,18 @@ struct Writer<'a, T: Clone> {
 impl<T: SimdReal> Writer<'_, T> {
     fn points(&self, points: &[(usize, usize)], band: &mut FieldBand<'_, T>) {
         for (at, &(x, y)) in points[band.sites.clone()].iter().enumerate() {
-            let motion = motion_at(self.motion, SITE_SPACING, x as f64, y as f64);
-            for k in 0..MOTION {
-                band.motion[k][at] = T::from_f64(motion[k]);
+            if let Some(pixels) = self.pixels {
+                (0..MOTION).for_each(|k| band.motion[k][at] = pixels.unrefined.at(k, x, y));
+            } else {
+                let motion = motion_at(self.motion, SITE_SPACING, x as f64, y as f64);
+                (0..MOTION).for_each(|k| band.motion[k][at] = T::from_f64(motion[k]));
             }
             for (spread, planes) in self.spreads(band) {
                 for (k, plane) in planes.iter_mut().enumerate() {
                     plane[at] = spread.at(k, (x, y));
                 }
             }
+            self.move_row(band, (y, (x, 1)), at..at + 1);
             self.finish_site(band, at, (x, y));
         }
     }
@@ -140,6 +155,21 @@ impl<T: SimdReal> Writer<'_, T> {
         let whole = self.spreads.as_ref().map(|spreads| &spreads.whole);
         let systematic = self.spreads.as_ref().and_then(|spreads| spreads.systematic.as_ref());
         whole.zip(Some(&mut band.covariance)).into_iter().chain(systematic.zip(Some(&mut band.systematic)))
+    }
+
+    /// Moves the flow at `places` of a band, which are pixels of row `y`, and widens its covariance by that.
+    fn move_row(&self, band: &mut FieldBand<'_, T>, (y, (first, step)): (usize, (usize, usize)), places: Range<usize>) {
+        let Some(pixels) = self.pixels else { return };
+        let moves = [0, 1].map(|k| &pixels.moves.line(k, y)[first..]);
+        for (flow, moves) in band.motion.iter_mut().zip(moves) {
+            flow[places.clone()].iter_mut().zip(moves.iter().step_by(step)).for_each(|(flow, &by)| *flow += by);
+        }
+        for (_, planes) in self.spreads(band) {
+            for (i, j) in [(0, 0), (0, 1), (1, 1)] {
+                let products = moves[i].iter().zip(moves[j]).map(|(&a, &b)| a * b).step_by(step);
+                planes[upper(i, j)][places.clone()].iter_mut().zip(products).for_each(|(entry, by)| *entry += by);
+            }
+        }
     }
 
     /// Writes status and diagnostics of a site, and NaN where there is no valid estimate.
@@ -229,9 +259,12 @@ impl<T: SimdReal> Kernel<T> for Rows<'_, '_, T> {
             let ((from, y), (next, _)) = (sites.pixel(0, row), sites.pixel(1, row));
             let columns = (from, next - from);
             let places = first - start..first - start + width;
-            reader.read_motion(writer.motion, y);
+            if writer.pixels.is_none() {
+                reader.read_motion(writer.motion, y);
+            }
             for (k, plane) in band.motion.iter_mut().enumerate() {
-                copy(reader.plane(k), columns, &mut plane[places.clone()]);
+                let line = writer.pixels.map_or_else(|| reader.plane(k), |pixels| pixels.unrefined.line(k, y));
+                copy(line, columns, &mut plane[places.clone()]);
             }
             for (spread, planes) in writer.spreads(band) {
                 for (k, plane) in planes.iter_mut().enumerate() {
@@ -243,6 +276,7 @@ impl<T: SimdReal> Kernel<T> for Rows<'_, '_, T> {
                     }
                 }
             }
+            writer.move_row(band, (y, columns), places.clone());
             if writer.is_plain(y, band) {
                 band.status[places].fill(Status::Ok);
             } else {
