@@ -4,10 +4,12 @@ VENV := .venv
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 BIN := $(VENV)/bin
 WHEELS := target/wheels
-# One profile for all that the check runs: crates that it depends on are built once.
+# One profile and one set of features for all that the check runs: the library and the crates that it depends on
+# are built once, for the wheel and for Rust's tests.
 CI := --profile ci
-# Rust's tests also look for overflow and failed assertions.
-CHECKED := --config profile.ci.package.jacoflow.overflow-checks=true --config profile.ci.package.jacoflow.debug-assertions=true
+CHECKED := $(CI) --features reference
+# Unit tests also look for overflow and failed assertions.
+ASSERTED := $(foreach setting,opt-level=0 overflow-checks=true debug-assertions=true,--config profile.ci.package.jacoflow.$(setting))
 
 .PHONY: test checks of-rust of-python demo format clippy features rustdoc rust-test guide wheel packages install pytest stubtest typing examples develop docs compare readme ablation clean
 
@@ -35,15 +37,14 @@ demo:
 format:
 	cargo fmt --check
 
-# Everything with the binding and the published tracker; without them, what nothing else uses.
+# Library, binary, tests, benches and binding, the published tracker too.
 clippy:
-	cargo clippy -q --all-targets --features python,reference -- -D warnings
-	cargo clippy -q --lib --bins -- -D warnings
+	cargo clippy -q --workspace --all-targets --features reference -- -D warnings
 
 # Rooms on their own. Those of one level do not import each other (`tests/layering.rs`): such that need the
 # same crates and lower rooms share a run.
 features:
-	@for rooms in filter,mixture flow,motion3d,segment,stereo synth io temporal track; do \
+	@for rooms in filter,mixture flow,motion3d,segment,stereo io,synth temporal track; do \
 		cargo check -q --no-default-features --features $$rooms || exit 1; done
 
 rustdoc:
@@ -51,9 +52,9 @@ rustdoc:
 
 # Unit tests have a library of their own, which takes longer to optimise than to run as it is.
 rust-test:
-	cargo test $(CI) $(CHECKED) --features reference --test '*'
-	cargo test $(CI) $(CHECKED) --features reference --doc
-	cargo test $(CI) $(CHECKED) --features reference --lib --config profile.ci.package.jacoflow.opt-level=0
+	cargo test $(CHECKED) --workspace --test '*'
+	cargo test $(CHECKED) --workspace --doc
+	cargo test $(CHECKED) --workspace --lib $(ASSERTED)
 
 # The page that tells how to add a motion model, followed to the letter in a copy.
 guide:
@@ -63,9 +64,11 @@ $(BIN)/maturin:
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install -q "maturin>=1.9.4,<2"
 
+# As the check tests it; `compare` builds what users get.
+BUILT = $(CHECKED)
 wheel: $(BIN)/maturin
 	rm -rf $(WHEELS)
-	$(BIN)/maturin build -q $(CI) --out $(WHEELS) -i $(BIN)/python
+	$(BIN)/maturin build -q $(BUILT) --out $(WHEELS) -i $(BIN)/python
 
 # What the package and its tests need beside the wheel.
 packages: $(BIN)/maturin
@@ -94,7 +97,7 @@ develop: $(BIN)/maturin
 	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --profile test --extras test
 
 # Ours, as a user would get it, and OpenCV and filterpy in one process; writes a dated table. DATA names a folder of recorded sequences, if there is one.
-compare: CI := --release
+compare: BUILT := --release
 compare: install
 	$(BIN)/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/$(WHEELS)/jacoflow-*.whl)"
 	$(BIN)/python -m benchmarks.compare $(if $(DATA),--data $(DATA))
@@ -109,7 +112,7 @@ readme: $(BIN)/maturin
 ablation: $(BIN)/maturin
 	$(PYTHON) -m venv $(VENV)-ablation
 	rm -rf target/wheels-ablation
-	$(BIN)/maturin build -q $(CI) --features python,ablation --out target/wheels-ablation -i $(BIN)/python
+	$(BIN)/maturin build -q --release --features ablation --out target/wheels-ablation -i $(BIN)/python
 	$(VENV)-ablation/bin/python -m pip install -q --force-reinstall --no-deps target/wheels-ablation/jacoflow-*.whl
 	$(VENV)-ablation/bin/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/target/wheels-ablation/jacoflow-*.whl)"
 	$(VENV)-ablation/bin/python -m benchmarks.ablation $(ARGUMENTS)

@@ -34,7 +34,9 @@ def main() -> int:
     (COPY / "tests" / "systems.rs").write_text("mod affine_flow;\n")
     # Benches stay behind, and so must their declarations. Compiling takes longer than the tests: not optimised.
     manifest = re.sub(r"\[\[bench\]\]\n(?:[^\[].*\n|\n)*", "", (COPY / "Cargo.toml").read_text())
-    (COPY / "Cargo.toml").write_text(manifest + "\n[workspace]\n\n[profile.ci.package.jacoflow]\nopt-level = 0\n")
+    # Nor does the binding come along.
+    manifest = manifest.replace('members = ["python"]\n', "")
+    (COPY / "Cargo.toml").write_text(manifest + "\n[profile.ci.package.jacoflow]\nopt-level = 0\n")
 
     (COPY / "src/flow/model/axial.rs").write_text(guide_block(text, "guide: src/flow/model/axial.rs"))
     line = guide_block(text, "guide line: src/flow/model/mod.rs motion_models!")

@@ -59,7 +59,6 @@ pub fn give<T: Send + 'static>(buffer: Vec<T>) {
 }
 
 /// Copies `values` into a pooled buffer, or into a new one.
-#[cfg(feature = "python")]
 pub fn copy<T: Copy + Send + 'static>(values: &[T]) -> Vec<T> {
     match take(values.len()) {
         Some(mut buffer) => {

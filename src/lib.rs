@@ -10,10 +10,11 @@
 //!
 //! # Map
 //! Level by level, a module imports only from lower levels: [`error`], [`types`], [`math`], [`parallel`],
-//! [`simd`] (0); [`image`] (1); [`jet`], [`io`], [`synth`] (2); [`flow`], [`filter`], [`mixture`],
-//! [`motion3d`], [`segment`], [`stereo`] (3); [`temporal`], [`track`] (4); [`pipeline`] (5); the binary and
-//! the Python binding (6). Each room from level 1 up, and [`filter`], is a Cargo feature of its name;
-//! `default-features = false, features = ["filter"]` gives the filters alone.
+//! [`simd`], [`buffer_pool`] (0); [`image`] (1); [`jet`], [`io`], [`synth`] (2); [`flow`], [`filter`],
+//! [`mixture`], [`motion3d`], [`segment`], [`stereo`] (3); [`temporal`], [`track`] (4); [`pipeline`] (5);
+//! [`cli`], the binary (6). Each room from level 1 up, and [`filter`], is a Cargo feature of its name;
+//! `default-features = false, features = ["filter"]` gives the filters alone. The Python binding is a package
+//! of its own, `python/`.
 
 // A choice of rooms uses a choice of what the lower ones offer.
 #![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
@@ -21,7 +22,7 @@
 #[doc(hidden)]
 pub mod ablation;
 #[cfg(feature = "temporal")]
-mod buffer_pool;
+pub mod buffer_pool;
 pub mod error;
 #[cfg(feature = "filter")]
 pub mod filter;
@@ -58,7 +59,5 @@ pub mod types;
 
 #[cfg(feature = "cli")]
 pub mod cli;
-#[cfg(feature = "python")]
-mod python;
 
 pub use error::{Error, Result};

@@ -1,15 +1,16 @@
 //! The one direction of imports: a module imports only from lower levels, never from a sibling, and the files
 //! of a room form no circles.
 //!
-//! Reads every path of a `use` or of an expression in `src/` and `benchmarks/`; the table of levels is that
-//! of `ARCHITECTURE.md`. A parent module and its children may name each other.
+//! Reads every path of a `use` or of an expression in the sources and `benchmarks/`; the table of levels is
+//! that of `ARCHITECTURE.md`. A parent module and its children may name each other.
 
 mod source;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::path::Path;
 
-use source::{files, name_of, root};
+use source::{SOURCES, files, name_of, root};
 
 /// Folder (or file) under `src/` and its level.
 const LEVELS: &[(&str, u8)] = &[
@@ -35,7 +36,6 @@ const LEVELS: &[(&str, u8)] = &[
     ("track", 4),
     ("pipeline", 5),
     ("cli", 6),
-    ("python", 6),
 ];
 
 /// Level 0 is ordered too: each may use only those before it.
@@ -51,8 +51,7 @@ fn is_allowed(from: &str, to: &str) -> bool {
         return true;
     }
     let place = |room: &str| FOUNDATION.iter().position(|f| *f == room);
-    // The binding exposes the binary's entry point; nothing imports the binding.
-    (a == 0 && b == 0 && place(to) < place(from)) || (from == "python" && to == "cli")
+    a == 0 && b == 0 && place(to) < place(from)
 }
 
 /// Source text without comments, strings' contents kept.
@@ -133,16 +132,14 @@ fn expand(text: &str, prefix: &mut Vec<String>, found: &mut Vec<Vec<String>>) ->
     at
 }
 
-/// The modules of the crate: path (`["flow", "model"]`) and text of its file, unit tests and comments left
-/// out.
+/// The modules of a crate: path (`["flow", "model"]`) and text of its file, unit tests and comments left out.
 struct Modules(BTreeMap<Vec<String>, (String, String)>);
 
 impl Modules {
-    fn read() -> Self {
-        let src = root().join("src");
+    fn read(src: &Path) -> Self {
         let mut modules = BTreeMap::new();
-        for file in files(&src, "rs") {
-            let inside = file.strip_prefix(&src).unwrap().with_extension("");
+        for file in files(src, "rs") {
+            let inside = file.strip_prefix(src).unwrap().with_extension("");
             let mut path: Vec<String> = inside.iter().map(|part| part.to_string_lossy().into_owned()).collect();
             if path[0] == "lib" || path[0] == "bin" || path.iter().any(|part| part == "tests") {
                 continue;
@@ -294,14 +291,15 @@ fn systems_name_every_folder_of_tests() {
 
 #[test]
 fn files_of_a_room_form_no_circles() {
-    let modules = Modules::read();
-    let edges = modules.edges();
     let mut text = String::new();
-    for circle in circles(&edges) {
-        text += &format!("{} files:\n", circle.len());
-        for from in &circle {
-            let to: Vec<String> = edges[from].iter().filter(|to| circle.contains(to)).map(|to| to.join("/")).collect();
-            text += &format!("  {} -> {}\n", from.join("/"), to.join(", "));
+    for folder in SOURCES {
+        let edges = Modules::read(&root().join(folder)).edges();
+        for circle in circles(&edges) {
+            text += &format!("{} files in {folder}:\n", circle.len());
+            for from in &circle {
+                let to = edges[from].iter().filter(|to| circle.contains(to)).map(|to| to.join("/"));
+                text += &format!("  {} -> {}\n", from.join("/"), to.collect::<Vec<_>>().join(", "));
+            }
         }
     }
     assert!(text.is_empty(), "files that import each other in a circle:\n{text}");
@@ -352,14 +350,15 @@ fn benchmarks_form_no_circles() {
 }
 
 #[test]
-fn binding_and_argument_parser_stay_in_their_rooms() {
+fn interpreter_and_argument_parser_stay_in_their_rooms() {
     let src = root().join("src");
     for file in files(&src, "rs") {
         let inside = file.strip_prefix(&src).unwrap();
         let text = fs::read_to_string(&file).unwrap();
-        let is_outside = !["cli", "python"].iter().any(|room| inside.starts_with(room));
-        for word in ["pyo3::", "clap::", "indicatif::"] {
-            assert!(!(is_outside && text.contains(word)), "{} uses {word}", inside.display());
+        let strangers: &[&str] =
+            if inside.starts_with("cli") { &["pyo3::"] } else { &["pyo3::", "clap::", "indicatif::"] };
+        for word in strangers {
+            assert!(!text.contains(word), "{} uses {word}", inside.display());
         }
     }
 }

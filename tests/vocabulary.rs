@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use source::{files, name_of, root};
+use source::{SOURCES, files, name_of, root, rust_files};
 
 /// Words of the house's old idiom. Each has a plain term in the glossary.
 const IDIOMS: &str = "told tell tells telling obey obeys obeyed obeying stray strays thing things otherwise something \
@@ -110,12 +110,13 @@ fn idioms(words: &[String]) -> BTreeMap<String, usize> {
     found
 }
 
-/// The room of a source file: the folder below `src/`, two folders where a room holds several systems.
+/// The room of a source file: the folder below that of the sources, two folders where a room holds several
+/// systems.
 fn room(inside: &Path) -> String {
     let parts: Vec<String> = inside.iter().map(|part| part.to_string_lossy().into_owned()).collect();
-    let depth = if ["flow", "track", "python", "pipeline"].contains(&parts[0].as_str()) { 2 } else { 1 };
-    let depth = depth.min(parts.len() - 1).max(1);
-    parts[..depth].join("/")
+    let source = if parts[0] == "src" { 1 } else { 2 };
+    let depth = if ["flow", "track", "pipeline"].contains(&parts[source].as_str()) { 2 } else { 1 };
+    parts[..(source + depth).min(parts.len() - 1).max(source)].join("/")
 }
 
 /// Functions and types that a Rust source declares.
@@ -143,10 +144,9 @@ fn declared(text: &str) -> Vec<String> {
 #[test]
 fn comments_are_free_of_idioms() {
     let mut rooms: BTreeMap<String, Vec<String>> = BTreeMap::new();
-    let src = root().join("src");
-    for file in files(&src, "rs") {
+    for file in rust_files() {
         let text = fs::read_to_string(&file).unwrap();
-        rooms.entry(room(file.strip_prefix(&src).unwrap())).or_default().extend(words(&rust_comments(&text)));
+        rooms.entry(room(file.strip_prefix(root()).unwrap())).or_default().extend(words(&rust_comments(&text)));
     }
     for folder in ["python", "benchmarks"] {
         for file in files(&root().join(folder), "py") {
@@ -174,7 +174,7 @@ fn comments_are_free_of_idioms() {
 #[test]
 fn comment_lines_are_short() {
     let mut wrong = Vec::new();
-    for folder in ["src", "tests", "benches"] {
+    for folder in SOURCES.iter().chain(&["tests", "benches"]) {
         for file in files(&root().join(folder), "rs") {
             for (row, line) in fs::read_to_string(&file).unwrap().lines().enumerate() {
                 // A row of a table cannot be broken.
@@ -190,15 +190,14 @@ fn comment_lines_are_short() {
 
 #[test]
 fn names_are_those_of_the_field() {
-    let src = root().join("src");
     let mut wrong = Vec::new();
-    for file in files(&src, "rs") {
-        let inside = file.strip_prefix(&src).unwrap();
+    for file in rust_files() {
+        let inside = file.strip_prefix(root()).unwrap();
         let text = fs::read_to_string(&file).unwrap();
         let mut names = declared(&text);
         names.extend(inside.with_extension("").iter().map(|part| part.to_string_lossy().into_owned()));
         for (folder, replaced) in REPLACED {
-            if folder.is_empty() || inside.starts_with(folder) {
+            if folder.is_empty() || inside.starts_with(Path::new("src").join(folder)) {
                 for name in names.iter().filter(|name| is_in(replaced, &name.to_lowercase())) {
                     wrong.push(format!("{}: {name}", name_of(&file)));
                 }
@@ -237,14 +236,14 @@ fn the_readers_find_what_they_look_for() {
     assert_eq!(python_comments("\"\"\"Told.\"\"\"\nx = 1  # asked\ny = 2\n"), ["Told.", "asked"]);
     let found = idioms(&words(&["As far as it is told, told well."]));
     assert_eq!((found["told"], found["as far as"]), (2, 1));
-    assert_eq!(room(Path::new("flow/windowed/run.rs")), "flow/windowed");
-    assert_eq!(room(Path::new("io/source/glob.rs")), "io");
+    assert_eq!(room(Path::new("src/flow/windowed/run.rs")), "src/flow/windowed");
+    assert_eq!(room(Path::new("python/src/field/mod.rs")), "python/src/field");
 }
 
 #[test]
 fn constants_name_what_they_bound() {
     let mut wrong = Vec::new();
-    for file in files(&root().join("src"), "rs") {
+    for file in rust_files() {
         for line in fs::read_to_string(&file).unwrap().lines() {
             let Some((_, rest)) = line.split_once("const ") else { continue };
             let name: String = rest.chars().take_while(|c| c.is_ascii_uppercase() || *c == '_').collect();

@@ -1,7 +1,7 @@
 """The loop of the gradient tracker's source, to the letter and with repairs, and its parts: for comparison with `jacoflow.track.GradientTracker`.
 
 Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method" (IPSJ). The
-wheel is built without it; `maturin develop --features python,reference` builds it.
+wheel is built without it; `maturin develop --features reference` builds it.
 """
 
 from __future__ import annotations

@@ -53,6 +53,5 @@ pub use kalman::KalmanFilter;
 pub use scalar::update_by_scalar;
 pub use sigma_points::SigmaPoints;
 pub use state::GaussianState;
-#[cfg(feature = "python")]
-pub(crate) use state::{check_covariances, check_dimension, check_mean};
+pub use state::{check_covariances, check_dimension, check_mean};
 pub use unscented::UnscentedFilter;

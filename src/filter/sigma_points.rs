@@ -38,7 +38,10 @@ impl SigmaPoints {
     }
 
     /// Checks the constants for `n` dimensions.
-    pub(crate) fn check(&self, n: usize) -> Result<()> {
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming the constant.
+    pub fn check(&self, n: usize) -> Result<()> {
         if !(self.alpha.is_finite() && self.alpha > 0.0) {
             return Err(Error::argument("alpha", "a positive number", self.alpha));
         }

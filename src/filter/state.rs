@@ -196,7 +196,7 @@ pub(super) const LARGEST_DIMENSION: usize = 4096;
 ///
 /// # Errors
 /// [`Error::Argument`] when it is zero or above 4096.
-pub(crate) fn check_dimension(name: &'static str, n: usize) -> Result<()> {
+pub fn check_dimension(name: &'static str, n: usize) -> Result<()> {
     if (1..=LARGEST_DIMENSION).contains(&n) {
         return Ok(());
     }
@@ -221,7 +221,7 @@ fn check_batch(batch: usize, n: usize, m: usize) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Argument`] naming `x`.
-pub(crate) fn check_mean(x: &[f64]) -> Result<()> {
+pub fn check_mean(x: &[f64]) -> Result<()> {
     refuse("x", x, |v| !v.is_finite(), "finite numbers")
 }
 
@@ -229,7 +229,7 @@ pub(crate) fn check_mean(x: &[f64]) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Argument`] naming `name` and what is wrong.
-pub(crate) fn check_covariances(name: &'static str, values: &[f64], n: usize) -> Result<()> {
+pub fn check_covariances(name: &'static str, values: &[f64], n: usize) -> Result<()> {
     match values.chunks_exact(n * n).find_map(|matrix| covariance_fault(matrix, n)) {
         Some(fault) => Err(Error::argument(name, "a symmetric positive semi-definite matrix of finite numbers", fault)),
         None => Ok(()),

@@ -102,8 +102,11 @@ fn of_known_depths<const N: usize, const L: usize>(
     })
 }
 
-/// Whether a motion is finite and has a direction.
-pub(crate) fn check_motion(translation: &[f64; 3], rotation: &[f64; 3]) -> Result<()> {
+/// Refuses a motion that is not finite or has no direction.
+///
+/// # Errors
+/// [`Error::Argument`] naming `translation` or `rotation`.
+pub fn check_motion(translation: &[f64; 3], rotation: &[f64; 3]) -> Result<()> {
     let is_finite = |values: &[f64; 3]| values.iter().all(|value| value.is_finite());
     let is_direction = is_finite(translation) && *translation != [0.0; 3];
     refuse_if(!is_direction, "translation", "a finite vector with a direction", numbers(translation))?;

@@ -58,9 +58,7 @@ mod tests;
 
 pub use crate::scattered::Smoother;
 pub use crate::types::Intrinsics;
-#[cfg(feature = "python")]
-pub(crate) use bound::check_motion;
-pub use bound::{MotionBound, motion_bound, patch_motion_bound};
+pub use bound::{MotionBound, check_motion, motion_bound, patch_motion_bound};
 pub use diagnostics::contact::{ContactMap, contact_map};
 pub use estimate::estimate_motion;
 pub use field::{

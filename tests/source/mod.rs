@@ -3,6 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// Folders of Rust sources: the library with the binary, the Python binding.
+pub const SOURCES: [&str; 2] = ["src", "python/src"];
+
 /// The repository.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -30,4 +33,10 @@ fn collect(folder: &Path, extension: &str, into: &mut Vec<PathBuf>) {
 /// Path below the repository, with slashes.
 pub fn name_of(path: &Path) -> String {
     path.strip_prefix(root()).unwrap_or(path).to_string_lossy().replace('\\', "/")
+}
+
+/// The files of [`SOURCES`].
+#[allow(dead_code, reason = "one of the tests that share this file has no use for it")]
+pub fn rust_files() -> Vec<PathBuf> {
+    SOURCES.iter().flat_map(|folder| files(&root().join(folder), "rs")).collect()
 }

@@ -1,0 +1,276 @@
+//! numpy arrays in, core frames out, and back. Messages name the argument, what it was and what is accepted.
+
+use crate::errors::{Outcome, Raised};
+use jacoflow::buffer_pool;
+use jacoflow::error::Error;
+use jacoflow::types::{AnyFrame, Frame, Mask, Sample};
+use numpy::ndarray::{ArrayView, IntoDimension, ShapeBuilder};
+use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyIterator, PyList};
+
+/// Sample types that frames may have, for messages.
+const ACCEPTED: &str = "an array of uint8, uint16, float32 or float64";
+
+/// `object` as a numpy array: itself, or what `numpy.asarray` makes of it. Misaligned memory and that of
+/// another byte order is copied.
+pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
+    let py = object.py();
+    if object.hasattr("mask")? && object.is_instance_of::<PyUntypedArray>() {
+        return Err(PyTypeError::new_err(format!(
+            "{argument}: expected a plain array, got a masked one; pass its `data`, and the option mask=~frame.mask where there is one"
+        )).into());
+    }
+    let array = if let Ok(array) = object.cast::<PyUntypedArray>() {
+        array.clone()
+    } else {
+        py.import("numpy")?.getattr("asarray")?.call1((object,))?.cast_into::<PyUntypedArray>()?
+    };
+    let kind = array.getattr("dtype")?;
+    if !kind.getattr("isnative")?.extract::<bool>()? {
+        let native = kind.call_method1("newbyteorder", ("=",))?;
+        return Ok(array.call_method1("astype", (native,))?.cast_into::<PyUntypedArray>()?);
+    }
+    if array.getattr("flags")?.getattr("aligned")?.extract::<bool>()? {
+        return Ok(array);
+    }
+    Ok(array.call_method0("copy")?.cast_into::<PyUntypedArray>()?)
+}
+
+/// numpy's name of the array's element type.
+pub fn dtype_name(array: &Bound<'_, PyUntypedArray>) -> String {
+    array.dtype().str().map_or_else(|_| "unknown".into(), |name| name.to_string())
+}
+
+/// The elements in row-major order, for any strides.
+pub fn elements<T: Element + Copy + 'static>(array: &Bound<'_, PyUntypedArray>) -> Option<Vec<T>> {
+    let typed = array.cast::<PyArrayDyn<T>>().ok()?.try_readonly().ok()?;
+    if let Ok(slice) = typed.as_slice() {
+        // `as_slice` also takes Fortran order; only one-dimensional or row-major data may be taken as it
+        // lies.
+        if array.is_c_contiguous() {
+            return Some(buffer_pool::copy(slice));
+        }
+    }
+    Some(typed.as_array().iter().copied().collect())
+}
+
+/// The answer to an array of a type that frames may not have.
+pub fn wrong_dtype(argument: &str, array: &Bound<'_, PyUntypedArray>) -> PyErr {
+    PyTypeError::new_err(format!("{argument}: expected {ACCEPTED}, got {}", dtype_name(array)))
+}
+
+/// How a frame's dimensions are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColourRule {
+    /// Colour is refused with advice.
+    Refuse,
+    /// Colour is turned into luminance.
+    Luminance,
+}
+
+impl ColourRule {
+    /// `colour=None | "error" | "luminance"`.
+    pub fn parse(name: Option<&str>) -> Outcome<Self> {
+        match name {
+            None | Some("error") => Ok(Self::Refuse),
+            Some("luminance") => Ok(Self::Luminance),
+            Some(other) => Err(Error::argument("colour", "\"error\" or \"luminance\"", format!("{other:?}")).into()),
+        }
+    }
+}
+
+/// One frame `(H, W)`, or `(H, W, 3 or 4)` where colour is allowed.
+pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
+    let array = as_array(argument, object)?;
+    let shape = array.shape().to_vec();
+    match shape[..] {
+        [height, width] => {
+            let size = (width, height);
+            grey::<u8>(&array, size)
+                .or_else(|| grey::<u16>(&array, size))
+                .or_else(|| grey::<f32>(&array, size))
+                .or_else(|| grey::<f64>(&array, size))
+                .unwrap_or_else(|| Err(wrong_dtype(argument, &array).into()))
+        }
+        [height, width, channels @ (3 | 4)] if colour == ColourRule::Luminance => {
+            let size = (width, height);
+            luminance::<u8>(&array, size, channels)
+                .or_else(|| luminance::<u16>(&array, size, channels))
+                .or_else(|| luminance::<f32>(&array, size, channels))
+                .or_else(|| luminance::<f64>(&array, size, channels))
+                .unwrap_or_else(|| Err(wrong_dtype(argument, &array).into()))
+        }
+        [_, _, 3 | 4] => Err(PyValueError::new_err(format!(
+            "{argument}: expected a grey frame (H, W), got a colour frame {shape:?}; \
+             convert it with jacoflow.luminance(frame), or pass colour=\"luminance\" where there is that option"
+        ))
+        .into()),
+        _ => Err(PyValueError::new_err(format!("{argument}: expected a frame (H, W), got shape {shape:?}")).into()),
+    }
+}
+
+/// A frame of samples `T`; `None` where the array holds another type.
+fn grey<T: Element + Sample>(
+    array: &Bound<'_, PyUntypedArray>,
+    (width, height): (usize, usize),
+) -> Option<Outcome<AnyFrame>> {
+    Some(Frame::new(width, height, elements::<T>(array)?).map(T::grey).map_err(Raised::from))
+}
+
+/// An interleaved colour frame as luminance.
+fn luminance<T: Sample + Element>(
+    array: &Bound<'_, PyUntypedArray>,
+    (width, height): (usize, usize),
+    channels: usize,
+) -> Option<Outcome<AnyFrame>> {
+    let grey = jacoflow::image::luminance(width, height, channels, &elements::<T>(array)?);
+    Some(grey.map(T::grey).map_err(Raised::from))
+}
+
+/// What came as `frames`: a stack along the first axis, or a list or tuple of separate frames.
+pub struct Frames<'py> {
+    object: Bound<'py, PyAny>,
+    colour: ColourRule,
+    /// Number of frames.
+    pub count: usize,
+    /// An array (whose result keeps the time axis even for one field) rather than a list.
+    pub is_array: bool,
+}
+
+impl<'py> Frames<'py> {
+    /// Checks the outer shape; each frame is converted when it is needed, so that a long stack is never
+    /// copied whole.
+    pub fn new(object: &Bound<'py, PyAny>, colour: ColourRule) -> Outcome<Self> {
+        let is_sequence =
+            object.is_instance_of::<pyo3::types::PyList>() || object.is_instance_of::<pyo3::types::PyTuple>();
+        if is_sequence {
+            return Ok(Self { count: object.len()?, object: object.clone(), colour, is_array: false });
+        }
+        if object.cast::<PyIterator>().is_ok() {
+            let list = object.try_iter()?.collect::<PyResult<Vec<_>>>()?;
+            let list = PyList::new(object.py(), list)?;
+            return Ok(Self { count: list.len(), object: list.into_any(), colour, is_array: false });
+        }
+        let array = as_array("frames", object)?;
+        let shape = array.shape().to_vec();
+        let wanted = match colour {
+            ColourRule::Refuse => "a list of frames (H, W) or a stack (T, H, W)",
+            ColourRule::Luminance => "a list of frames or a stack (T, H, W) or (T, H, W, 3 or 4)",
+        };
+        let refuse = |advice: &str| {
+            Err(PyValueError::new_err(format!("frames: expected {wanted}, got an array of shape {shape:?}{advice}")))
+        };
+        match shape[..] {
+            [_, rows, 3 | 4] if rows > 4 => Ok(refuse(
+                ", which looks like one colour image; pass a list of frames, or a stack (T, H, W, 3) with colour=\"luminance\"",
+            )?),
+            [count, _, _] => Ok(Self { count, object: array.into_any(), colour, is_array: true }),
+            [count, _, _, 3 | 4] if colour == ColourRule::Luminance => {
+                Ok(Self { count, object: array.into_any(), colour, is_array: true })
+            }
+            [_, _, _, 3 | 4] => Ok(refuse("; for colour frames pass colour=\"luminance\"")?),
+            _ => Ok(refuse("")?),
+        }
+    }
+
+    /// Frame `index`.
+    pub fn get(&self, index: usize) -> Outcome<AnyFrame> {
+        frame("frames", &self.object.get_item(index)?, self.colour)
+    }
+}
+
+/// `mask`: a boolean array `(H, W)`, true where pixels may be used.
+pub fn mask(object: &Bound<'_, PyAny>) -> Outcome<Mask> {
+    let array = as_array("mask", object)?;
+    let [height, width] = array.shape()[..] else {
+        return Err(PyValueError::new_err(format!("mask: expected shape (H, W), got {:?}", array.shape())).into());
+    };
+    let Some(values) = elements::<bool>(&array) else {
+        return Err(PyTypeError::new_err(format!(
+            "mask: expected a boolean array, true where pixels may be used, got {}",
+            dtype_name(&array)
+        ))
+        .into());
+    };
+    Ok(Frame::new(width, height, values)?)
+}
+
+/// An `(N, 2)` array of integers.
+pub fn integer_pairs(argument: &'static str, object: &Bound<'_, PyAny>) -> Outcome<Vec<(i64, i64)>> {
+    let array = as_array(argument, object)?;
+    let kind: String = array.dtype().getattr("kind")?.extract()?;
+    if array.shape() == [0] {
+        return Ok(Vec::new());
+    }
+    if !matches!(array.shape(), [_, 2]) {
+        return Err(Error::argument(argument, "shape (N, 2), columns x and y", format!("{:?}", array.shape())).into());
+    }
+    if !matches!(kind.as_str(), "i" | "u") {
+        return Err(PyTypeError::new_err(format!("{argument}: expected integers, got {}", dtype_name(&array))).into());
+    }
+    let wide = array.call_method1("astype", ("int64",))?.cast_into::<PyUntypedArray>()?;
+    let values = elements::<i64>(&wide).unwrap_or_default();
+    Ok(values.as_chunks::<2>().0.iter().map(|&[x, y]| (x, y)).collect())
+}
+
+/// `length` or any number of doubles out of anything numpy can read as numbers.
+pub fn doubles(argument: &'static str, object: &Bound<'_, PyAny>) -> Outcome<(Vec<usize>, Vec<f64>)> {
+    let ragged = |raised: Raised| {
+        let error = PyErr::from(raised);
+        let own = error.is_instance_of::<PyValueError>(object.py());
+        let said = || format!("{argument}: expected rows of equal length, got {}", error.value(object.py()));
+        if own { PyValueError::new_err(said()) } else { error }
+    };
+    let array = as_array(argument, object).map_err(ragged)?;
+    let kind: String = array.dtype().getattr("kind")?.extract()?;
+    if !matches!(kind.as_str(), "f" | "i" | "u") {
+        return Err(
+            PyTypeError::new_err(format!("{argument}: expected real numbers, got {}", dtype_name(&array))).into()
+        );
+    }
+    let wide = array.call_method1("astype", ("float64",))?.cast_into::<PyUntypedArray>()?;
+    Ok((array.shape().to_vec(), elements::<f64>(&wide).unwrap_or_default()))
+}
+
+/// A new array that owns `values`, of the given shape, row-major.
+pub fn owned<'py, T: Element>(py: Python<'py>, shape: &[usize], values: Vec<T>) -> Outcome<Bound<'py, PyAny>> {
+    Ok(numpy::PyArray1::from_vec(py, values).reshape(shape)?.into_any())
+}
+
+/// A frame as a new array `(H, W)`.
+pub fn from_frame<T: Element>(py: Python<'_>, frame: Frame<T>) -> Outcome<Bound<'_, PyAny>> {
+    let (width, height) = frame.size();
+    owned(py, &[height, width], frame.into_data())
+}
+
+/// A frame of any sample type as a new array `(H, W)`.
+pub fn from_any_frame(py: Python<'_>, frame: AnyFrame) -> Outcome<Bound<'_, PyAny>> {
+    match frame {
+        AnyFrame::U8(frame) => from_frame(py, frame),
+        AnyFrame::U16(frame) => from_frame(py, frame),
+        AnyFrame::F32(frame) => from_frame(py, frame),
+        AnyFrame::F64(frame) => from_frame(py, frame),
+    }
+}
+
+/// A read-only view of `data` with the given shape and strides (in elements), kept alive by `owner`.
+pub fn view<'py, T: Element>(
+    owner: &Bound<'py, PyAny>,
+    data: &[T],
+    shape: &[usize],
+    strides: &[usize],
+) -> Outcome<Bound<'py, PyAny>> {
+    if shape.contains(&0) {
+        return Ok(PyArray::<T, _>::zeros(owner.py(), shape.into_dimension(), false).into_any());
+    }
+    let layout = shape.into_dimension().strides(strides.into_dimension());
+    let array = ArrayView::from_shape(layout, data).map_err(|e| PyValueError::new_err(e.to_string()))?;
+    // SAFETY: callers pass memory owned by the frozen Python object `owner`, which never reallocates or frees
+    // it while it lives; `owner` becomes the base of the new array. The array is made read-only before anyone
+    // sees it, and stays so, because its base offers no writable buffer.
+    let array = unsafe { PyArrayDyn::borrow_from_array(&array, owner.clone()) };
+    array.getattr("flags")?.setattr("writeable", false)?;
+    Ok(array.into_any())
+}

@@ -1,0 +1,163 @@
+//! A field as a dictionary of arrays and plain values, and back: what pickling needs.
+
+use super::{FlowField, Packed, Store, Stored, each};
+use crate::arrays;
+use crate::errors::{Outcome, Raised};
+use jacoflow::error::Error;
+use jacoflow::types::{FieldLayout, Rect, SamplingGrid, Status};
+use numpy::{PyArrayDyn, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+/// Everything that makes a field, copied out of the memory it may share with others.
+pub fn save<'py>(field: &FlowField, py: Python<'py>) -> Outcome<Bound<'py, PyDict>> {
+    let state = layout_state(py, field.layout())?;
+    let (width, height) = field.size();
+    state.set_item("stack", field.stack)?;
+    state.set_item("count", field.count)?;
+    each!(field.store, packed => {
+        state.set_item("correlation_length", packed.layout.correlation_length)?;
+        state.set_item("frame_index", packed.layout.frame_index + field.start)?;
+        let part = |total: usize| {
+            let length = total / packed.count.max(1);
+            field.start * length..(field.start + field.count) * length
+        };
+        let shape = |total: usize| [field.count, total / (packed.count * width * height).max(1), height, width];
+        state.set_item("motion", arrays::owned(py, &shape(packed.motion.len()), packed.motion[part(packed.motion.len())].to_vec())?)?;
+        state.set_item("status", arrays::owned(py, &shape(packed.status.len()), packed.status[part(packed.status.len())].to_vec())?)?;
+        let optional = [("covariance", &packed.covariance), ("residual", &packed.residual), ("condition", &packed.condition), ("window", &packed.window)];
+        for (name, planes) in optional {
+            if let Some(planes) = planes {
+                state.set_item(name, arrays::owned(py, &shape(planes.len()), planes[part(planes.len())].to_vec())?)?;
+            }
+        }
+        if let Some(rank) = &packed.rank {
+            state.set_item("rank", arrays::owned(py, &shape(rank.len()), rank[part(rank.len())].to_vec())?)?;
+        }
+    });
+    Ok(state)
+}
+
+/// The layout as plain values.
+fn layout_state<'py>(py: Python<'py>, layout: &FieldLayout) -> Outcome<Bound<'py, PyDict>> {
+    let state = PyDict::new(py);
+    state.set_item("frame_size", layout.frame_size)?;
+    state.set_item("model", &layout.model)?;
+    state.set_item("parameters", &layout.parameters)?;
+    state.set_item("frame_period", layout.frame_period)?;
+    state.set_item("pixel_pitch", layout.pixel_pitch)?;
+    match &layout.sites {
+        SamplingGrid::Grid { region, stride } => {
+            state.set_item("region", region.map(|r| (r.x, r.y, r.width, r.height)))?;
+            state.set_item("stride", stride)?;
+        }
+        SamplingGrid::Points(points) => state.set_item("points", points)?,
+    }
+    Ok(state)
+}
+
+/// A field from what `FlowField.__reduce__` wrote.
+#[pyfunction(name = "_restore_field")]
+pub fn restore_field(state: &Bound<'_, PyDict>) -> Outcome<FlowField> {
+    let motion = required(state, "motion")?;
+    if motion.cast::<PyArrayDyn<f32>>().is_ok() { restore::<f32>(state) } else { restore::<f64>(state) }
+}
+
+fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> Outcome<FlowField> {
+    let sites = match state.get_item("points")? {
+        Some(points) => SamplingGrid::Points(points.extract()?),
+        None => SamplingGrid::Grid {
+            region: required(state, "region")?
+                .extract::<Option<(usize, usize, usize, usize)>>()?
+                .map(|(x, y, width, height)| Rect { x, y, width, height }),
+            stride: required(state, "stride")?.extract()?,
+        },
+    };
+    let layout = FieldLayout {
+        frame_size: required(state, "frame_size")?.extract()?,
+        sites,
+        model: required(state, "model")?.extract()?,
+        parameters: required(state, "parameters")?.extract()?,
+        frame_period: required(state, "frame_period")?.extract()?,
+        pixel_pitch: required(state, "pixel_pitch")?.extract()?,
+        frame_index: required(state, "frame_index")?.extract()?,
+        correlation_length: required(state, "correlation_length")?.extract()?,
+    };
+    let (width, height) = layout.sites.shape(layout.frame_size)?;
+    let count: usize = required(state, "count")?.extract()?;
+    let (sites, parameters) = (width * height * count, layout.parameters.len());
+    let packed = Packed {
+        width,
+        height,
+        count,
+        motion: plane::<T>(state, "motion", sites * parameters)?.ok_or_else(|| missing("motion"))?,
+        covariance: plane(state, "covariance", sites * parameters * (parameters + 1) / 2)?,
+        status: plane(state, "status", sites)?.ok_or_else(|| missing("status"))?,
+        residual: plane(state, "residual", sites)?,
+        rank: plane(state, "rank", sites)?,
+        condition: plane(state, "condition", sites)?,
+        window: plane(state, "window", sites)?,
+        layout,
+    };
+    if packed.status.iter().any(|&code| Status::from_code(code).is_none()) {
+        return Err(Error::argument("state", "known status codes", "an unknown one").into());
+    }
+    let stack: bool = required(state, "stack")?.extract()?;
+    Ok(FlowField { store: T::store(packed), start: 0, count, stack })
+}
+
+/// A field of arrays from elsewhere.
+pub fn from_arrays(
+    flow: &Bound<'_, PyAny>,
+    covariance: Option<&Bound<'_, PyAny>>,
+    jacobian: Option<&Bound<'_, PyAny>>,
+) -> Outcome<FlowField> {
+    let (shape, values) = arrays::doubles("flow", flow)?;
+    let [height, width, 2] = shape[..] else {
+        return Err(Error::argument("flow", "shape (H, W, 2)", format!("shape {shape:?}")).into());
+    };
+    // Plane k holds every `tail`-th value of an array from its `at`-th on.
+    let planes = |values: &[f64], tail: usize, places: &[usize]| -> Vec<f64> {
+        places.iter().flat_map(|&at| values.iter().skip(at).step_by(tail).copied()).collect()
+    };
+    let matrices = |name: &'static str, object: &Bound<'_, PyAny>, side: usize, places: &[usize]| {
+        let (shape, values) = arrays::doubles(name, object)?;
+        if shape != [height, width, side, side] {
+            let expected = format!("shape ({height}, {width}, {side}, {side})");
+            return Err(Raised::from(Error::argument(name, expected, format!("shape {shape:?}"))));
+        }
+        Ok(planes(&values, side * side, places))
+    };
+    let mut motion = planes(&values, 2, &[0, 1]);
+    if let Some(jacobian) = jacobian {
+        motion.extend(matrices("jacobian", jacobian, 2, &[0, 2, 1, 3])?);
+    }
+    let side = if jacobian.is_some() { 6 } else { 2 };
+    let upper: Vec<usize> = (0..side).flat_map(|i| (i..side).map(move |j| i * side + j)).collect();
+    let covariance = covariance.map(|object| matrices("covariance", object, side, &upper)).transpose()?;
+    Ok(FlowField::single(jacoflow::types::FlowField::from_planes((width, height), motion, covariance)?))
+}
+
+fn missing(name: &str) -> Raised {
+    Error::argument("state", format!("the entry {name:?}"), "none").into()
+}
+
+fn required<'py>(state: &Bound<'py, PyDict>, name: &str) -> Outcome<Bound<'py, PyAny>> {
+    state.get_item(name)?.ok_or_else(|| missing(name))
+}
+
+fn plane<T: numpy::Element + Copy>(state: &Bound<'_, PyDict>, name: &str, length: usize) -> Outcome<Option<Vec<T>>> {
+    let Some(array) = state.get_item(name)? else { return Ok(None) };
+    let array = array.cast_into::<PyArrayDyn<T>>()?;
+    let values = array.try_readonly()?.as_array().iter().copied().collect::<Vec<T>>();
+    if values.len() != length {
+        return Err(Error::argument("state", format!("{length} values in {name:?}"), values.len()).into());
+    }
+    Ok(Some(values))
+}
+
+/// Words of the status codes, by code.
+#[pyfunction(name = "_status_names")]
+pub fn status_names() -> Vec<&'static str> {
+    Status::ALL.iter().map(|status| status.name()).collect()
+}

@@ -1,0 +1,240 @@
+//! Options that estimators and the flow filter share, from what Python gives.
+
+use super::arrays::{self, ColourRule};
+use crate::errors::Outcome;
+use jacoflow::error::Error;
+use jacoflow::image::{GaussianSmoother, Preprocess, Quantiser};
+use jacoflow::jet::Neighbourhood;
+use jacoflow::parallel::Threads;
+use jacoflow::simd::Level;
+use jacoflow::types::{AnyFrame, Mask, Precision, Rect, Sample, SamplingGrid};
+use pyo3::conversion::FromPyObjectOwned;
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
+use pyo3::prelude::*;
+
+/// An integer argument. One that 64 bits do not hold becomes the nearest that they do, so that it is refused
+/// by name where it is out of range.
+#[derive(Debug, Clone, Copy, IntoPyObject, IntoPyObjectRef)]
+#[pyo3(transparent)]
+pub struct Integer(pub i64);
+
+impl<'py> FromPyObject<'_, 'py> for Integer {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        match object.extract::<i64>() {
+            Err(error) if error.is_instance_of::<PyOverflowError>(object.py()) => {
+                Ok(Self(if object.lt(0)? { i64::MIN } else { i64::MAX }))
+            }
+            value => Ok(Self(value?)),
+        }
+    }
+}
+
+/// The argument `region`, any sequence (x, y, width, height), px.
+#[derive(Debug, Clone, Copy, IntoPyObject, IntoPyObjectRef)]
+#[pyo3(transparent)]
+pub struct Region((i64, i64, i64, i64));
+
+impl<'py> FromPyObject<'_, 'py> for Region {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let wrong = || PyTypeError::new_err("region: expected four integers (x, y, width, height)");
+        let items: Vec<Bound<'_, PyAny>> = object.try_iter().and_then(Iterator::collect).map_err(|_| wrong())?;
+        let numbers: Vec<Integer> =
+            items.iter().map(PyAnyMethods::extract).collect::<PyResult<_>>().map_err(|_| wrong())?;
+        let [Integer(x), Integer(y), Integer(width), Integer(height)] = numbers[..] else { return Err(wrong()) };
+        Ok(Self((x, y, width, height)))
+    }
+}
+
+/// An object that may be absent, as an argument takes it and a pickle keeps it.
+pub type Object = Option<Py<PyAny>>;
+
+/// A deep copy of an option, so that later changes by the user do not reach it.
+pub fn keep(py: Python<'_>, object: Object) -> Outcome<Object> {
+    let copy = |object: Py<PyAny>| Ok(py.import("copy")?.getattr("deepcopy")?.call1((object,))?.unbind());
+    object.map(copy).transpose()
+}
+
+/// A group of options: an object of `jacoflow._options`, or none, whose options are all absent.
+pub struct Group<'py>(Option<Bound<'py, PyAny>>);
+
+impl<'py> Group<'py> {
+    /// The argument called `argument`, an object of one of the `classes`, which are listed in the message.
+    pub fn new(py: Python<'py>, argument: &str, classes: &[&str], object: &Object) -> Outcome<Self> {
+        let Some(object) = object else { return Ok(Self(None)) };
+        let object = object.bind(py).clone();
+        let known = py.import("jacoflow._options")?;
+        for class in classes {
+            if object.is_instance(&known.getattr(*class)?)? {
+                return Ok(Self(Some(object)));
+            }
+        }
+        let names: Vec<String> = classes.iter().map(|class| format!("jacoflow.{class}")).collect();
+        let got = object.get_type().name()?;
+        Err(PyTypeError::new_err(format!("{argument}: expected {}, got {got}", names.join(" or "))).into())
+    }
+
+    /// The option called `name`, if it was given.
+    pub fn get<T: FromPyObjectOwned<'py>>(&self, name: &str) -> Outcome<Option<T>> {
+        let Some(object) = &self.0 else { return Ok(None) };
+        let Some(value) = object.getattr_opt(name)?.filter(|value| !value.is_none()) else { return Ok(None) };
+        Ok(value.extract().map(Some).map_err(|error| {
+            let message = Into::<PyErr>::into(error).value(object.py()).to_string();
+            let is_named = message.starts_with(&format!("{name}: "));
+            PyTypeError::new_err(if is_named { message } else { format!("{name}: {message}") })
+        })?)
+    }
+}
+
+/// The string that an option is, unless it is another object.
+pub fn word(py: Python<'_>, object: &Object) -> Option<String> {
+    object.as_ref()?.extract(py).ok()
+}
+
+/// A count of at least one.
+pub fn count(name: &'static str, Integer(value): Integer) -> Outcome<usize> {
+    usize::try_from(value)
+        .ok()
+        .filter(|&n| n > 0)
+        .ok_or_else(|| Error::argument(name, "a positive integer", value).into())
+}
+
+/// `threads`: a positive number, or all.
+pub fn threads(value: Option<Integer>) -> Outcome<Threads> {
+    Ok(Threads::new(value.map(|n| count("threads", n)).transpose()?)?)
+}
+
+/// `simd`: the name of an instruction set that the processor has.
+pub fn simd(name: Option<&str>) -> Outcome<Option<Level>> {
+    Ok(name.map(Level::parse).transpose()?)
+}
+
+/// `grid`: where to estimate.
+pub fn grid(py: Python<'_>, object: &Object) -> Outcome<SamplingGrid> {
+    let group = Group::new(py, "grid", &["SamplingGrid"], object)?;
+    let region = region(group.get("region")?)?;
+    let stride = group.get("stride")?.map(|n| count("stride", n)).transpose()?;
+    let Some(points) = group.get::<Bound<'_, PyAny>>("points")? else {
+        let SamplingGrid::Grid { stride: default, .. } = SamplingGrid::default() else {
+            return Ok(SamplingGrid::default());
+        };
+        return Ok(SamplingGrid::Grid { region, stride: stride.unwrap_or(default) });
+    };
+    if region.is_some() || stride.is_some() {
+        let other = if region.is_some() { "region" } else { "stride" };
+        return Err(Error::argument("points", format!("points without {other}"), "both").into());
+    }
+    let inside = arrays::integer_pairs("points", &points)?
+        .into_iter()
+        .map(|(x, y)| Ok((usize::try_from(x).map_err(|_| (x, y))?, usize::try_from(y).map_err(|_| (x, y))?)));
+    let pixels = inside.collect::<Result<Vec<_>, _>>();
+    pixels.map(SamplingGrid::Points).map_err(|point: (i64, i64)| {
+        Error::argument("points", "pixels (x, y) inside the frame", format!("{point:?}")).into()
+    })
+}
+
+/// `neighbourhood`: (columns, rows) or an (N, 2) array of offsets, of equal weights.
+pub fn neighbourhood(value: &Bound<'_, PyAny>) -> Outcome<Neighbourhood> {
+    let rectangle = |columns, rows| {
+        let (width, height) = (count("neighbourhood", columns)?, count("neighbourhood", rows)?);
+        Ok(Neighbourhood::Rectangle { width, height, sigma: None })
+    };
+    if let Ok((columns, rows)) = value.extract::<(Integer, Integer)>() {
+        return rectangle(columns, rows);
+    }
+    let array = arrays::as_array("neighbourhood", value)?;
+    if let Ok([columns, rows]) = array.extract::<[Integer; 2]>() {
+        return rectangle(columns, rows);
+    }
+    let offsets = arrays::integer_pairs("neighbourhood", array.as_any())?;
+    let narrow = offsets.into_iter().map(|(x, y)| Ok((i32::try_from(x)?, i32::try_from(y)?)));
+    let offsets = narrow
+        .collect::<Result<Vec<_>, std::num::TryFromIntError>>()
+        .map_err(|_| Error::argument("neighbourhood", "offsets of a few px", "one far outside"))?;
+    Ok(Neighbourhood::Points { offsets, sigma: None })
+}
+
+/// `fps`, as seconds between frames.
+pub fn frame_period(fps: Option<f64>) -> Outcome<Option<f64>> {
+    match fps {
+        Some(fps) if !(fps.is_finite() && fps > 0.0) => {
+            Err(Error::argument("fps", "a positive number of frames per second", fps).into())
+        }
+        fps => Ok(fps.map(|fps| 1.0 / fps)),
+    }
+}
+
+/// `preprocess`: what is done to each frame first.
+pub struct PreprocessOptions {
+    quantise: Option<f64>,
+    /// Standard deviation of the smoothing, px.
+    pub smooth: Option<f64>,
+    /// What is done with colour.
+    pub colour: ColourRule,
+}
+
+impl PreprocessOptions {
+    /// The options that `object` holds.
+    pub fn new(py: Python<'_>, object: &Object) -> Outcome<Self> {
+        let group = Group::new(py, "preprocess", &["Preprocess"], object)?;
+        let colour = ColourRule::parse(group.get::<String>("colour")?.as_deref())?;
+        Ok(Self { quantise: group.get("quantise")?, smooth: group.get("smooth")?, colour })
+    }
+
+    /// The steps; smoothing leaves out what `mask` excludes.
+    pub fn steps(&self, mask: Option<&Mask>) -> Outcome<Preprocess> {
+        Ok(Preprocess {
+            quantise: self.quantise.map(Quantiser::new).transpose()?,
+            smooth: self.smooth.map(GaussianSmoother::new).transpose()?,
+            mask: mask.cloned(),
+        })
+    }
+}
+
+/// `pixel_pitch`: one length for both axes or (dx, dy).
+pub fn pixel_pitch(py: Python<'_>, value: &Object) -> Outcome<Option<(f64, f64)>> {
+    let Some(value) = value else { return Ok(None) };
+    let value = value.bind(py);
+    if let Ok(pair) = value.extract::<(f64, f64)>() {
+        return Ok(Some(pair));
+    }
+    match value.extract::<f64>() {
+        Ok(side) => Ok(Some((side, side))),
+        Err(_) => {
+            Err(PyTypeError::new_err(format!("pixel_pitch: expected a length or (dx, dy), got {}", value.get_type()))
+                .into())
+        }
+    }
+}
+
+/// `precision=None | "float32" | "float64"`.
+pub fn precision(name: Option<&str>) -> Outcome<Precision> {
+    Ok(name.map_or(Ok(Precision::Auto), Precision::parse)?)
+}
+
+/// Refuses a frame that does not continue the sequence.
+pub fn check_dtype(argument: &str, first: &str, frame: &AnyFrame) -> Outcome<()> {
+    if frame.dtype() == first {
+        return Ok(());
+    }
+    Err(PyTypeError::new_err(format!("{argument}: expected {first} like the first frame, got {}", frame.dtype()))
+        .into())
+}
+
+/// `region`: (x, y, width, height), px.
+pub fn region(region: Option<Region>) -> Outcome<Option<Rect>> {
+    let Some(Region((x, y, width, height))) = region else { return Ok(None) };
+    let side = |value: i64| usize::try_from(value).ok();
+    let rect = || Some(Rect { x: side(x)?, y: side(y)?, width: side(width)?, height: side(height)? });
+    let got = format!("({x}, {y}, {width}, {height})");
+    rect().map(Some).ok_or_else(|| Error::argument("region", "(x, y, width, height), none negative", got).into())
+}
+
+/// The static name of a sample type.
+pub fn known_dtype(name: &str) -> Outcome<&'static str> {
+    let known = [u8::DTYPE, u16::DTYPE, f32::DTYPE, f64::DTYPE].into_iter().find(|known| *known == name);
+    known.ok_or_else(|| Error::argument("state", "a sample type that frames have", format!("{name:?}")).into())
+}
