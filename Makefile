@@ -6,10 +6,10 @@ BIN := $(VENV)/bin
 WHEELS := target/wheels
 # One profile and one set of features for all that the check runs: the library and the crates that it depends on
 # are built once, for the wheel and for Rust's tests.
-CI := --profile ci
-CHECKED := $(CI) --features reference
+CHECKED := --profile ci --features reference
 # Unit tests also look for overflow and failed assertions.
-ASSERTED := $(foreach setting,opt-level=0 overflow-checks=true debug-assertions=true,--config profile.ci.package.jacoflow.$(setting))
+ASSERTED := --config profile.ci.package.jacoflow.opt-level=0 --config profile.ci.package.jacoflow.overflow-checks=true \
+	--config profile.ci.package.jacoflow.debug-assertions=true
 
 .PHONY: test checks of-rust of-python demo format clippy features rustdoc rust-test guide wheel packages install pytest stubtest typing examples develop docs compare readme ablation clean
 
@@ -37,9 +37,10 @@ demo:
 format:
 	cargo fmt --check
 
-# Library, binary, tests, benches and binding, the published tracker too.
+# Library, binary, tests, benches and binding with the published tracker; without it, what users get.
 clippy:
 	cargo clippy -q --workspace --all-targets --features reference -- -D warnings
+	cargo clippy -q --workspace --lib --bins -- -D warnings
 
 # Rooms on their own. Those of one level do not import each other (`tests/layering.rs`): such that need the
 # same crates and lower rooms share a run.
@@ -50,11 +51,12 @@ features:
 rustdoc:
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private-intra-doc-links" cargo doc -q --no-deps
 
-# Unit tests have a library of their own, which takes longer to optimise than to run as it is.
+# `--workspace` asks for the features of the wheel's library. Unit tests have a library of their own, which takes
+# longer to optimise than to run as it is; in the workspace they would link the binding to an interpreter.
 rust-test:
 	cargo test $(CHECKED) --workspace --test '*'
 	cargo test $(CHECKED) --workspace --doc
-	cargo test $(CHECKED) --workspace --lib $(ASSERTED)
+	cargo test $(CHECKED) --lib $(ASSERTED)
 
 # The page that tells how to add a motion model, followed to the letter in a copy.
 guide:
@@ -107,7 +109,8 @@ readme: $(BIN)/maturin
 	$(BIN)/python -m pip install -q numpy
 	$(BIN)/python -m benchmarks.readme
 
-# What each heuristic buys: a build with the feature `ablation` in a virtual environment of its own.
+# What each heuristic buys: a build with the feature `ablation`, as fast as a user's, in a virtual environment of
+# its own.
 # ARGUMENTS are those of `python -m benchmarks.ablation`.
 ablation: $(BIN)/maturin
 	$(PYTHON) -m venv $(VENV)-ablation

@@ -4,8 +4,8 @@ speed of the extension module.
     python -m benchmarks.build [--variants ci "1 unit" ...] [--repeats 9]
 
 Crates that the library depends on are compiled once and left out of the cost, in a folder that is deleted at
-the end. Columns: CPU seconds of the compiler on the library, of all its threads; size of the module, stripped
-as in the wheel, MB; CPU time of one flow estimate on one thread over that of the first variant. The estimates
+the end. Settings apply to the library alone. Columns: CPU seconds of the compiler on library and binding, of all
+its threads; size of the module, stripped as in the wheel, MB; CPU time of one flow estimate on one thread over that of the first variant. The estimates
 of the variants take turns, and the least time of each counts. Where two hardware threads share a core, CPU
 times nearly double while the other one works: run it on a quiet machine. Needs cargo, `strip` and numpy.
 """
@@ -67,6 +67,8 @@ def compiled(name: str, scratch: Path) -> tuple[float, float]:
         env={
             **os.environ,
             "CARGO_TARGET_DIR": str(target),
+            "PYO3_BUILD_EXTENSION_MODULE": "1",
+            "PYO3_PYTHON": sys.executable,
             "RUSTC_WORKSPACE_WRAPPER": str(wrapper),
             MEASURED: str(seconds),
         },

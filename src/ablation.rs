@@ -24,6 +24,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("flow.sufficient_median", "a median that explains half of the residual is taken without a gain"),
     ("flow.last_two_frames", "beside motion boundaries three frames take the motion of the last two"),
     ("flow.variational_refinement", "the flow of pixels moves where that explains the frames better than windows do"),
+    ("flow.refinement_error", "what the refinement moves the flow by widens its covariance"),
     ("flow.boundary_error", "jumps of the motion nearby widen the covariance"),
     ("flow.detail_bias", "motion that the finest detail of the frames contradicts over wide windows is moved"),
     ("flow.detail_scatter", "differences with and without the finest detail widen the covariance"),

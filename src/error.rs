@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 
 /// What can go wrong, by what the caller has to change.
 #[derive(Debug)]
-#[non_exhaustive]
 pub enum Error {
     /// An argument has an unusable value, shape or combination (Python: `ValueError`).
     Argument {

@@ -10,7 +10,7 @@
 //!
 //! # Map
 //! Level by level, a module imports only from lower levels: [`error`], [`types`], [`math`], [`parallel`],
-//! [`simd`], [`buffer_pool`] (0); [`image`] (1); [`jet`], [`io`], [`synth`] (2); [`flow`], [`filter`],
+//! [`simd`] (0); [`image`] (1); [`jet`], [`io`], [`synth`] (2); [`flow`], [`filter`],
 //! [`mixture`], [`motion3d`], [`segment`], [`stereo`] (3); [`temporal`], [`track`] (4); [`pipeline`] (5);
 //! [`cli`], the binary (6). Each room from level 1 up, and [`filter`], is a Cargo feature of its name;
 //! `default-features = false, features = ["filter"]` gives the filters alone. The Python binding is a package
@@ -21,7 +21,9 @@
 
 #[doc(hidden)]
 pub mod ablation;
+// Public for the binding.
 #[cfg(feature = "temporal")]
+#[doc(hidden)]
 pub mod buffer_pool;
 pub mod error;
 #[cfg(feature = "filter")]

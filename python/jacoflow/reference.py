@@ -1,7 +1,7 @@
 """The loop of the gradient tracker's source, to the letter and with repairs, and its parts: for comparison with `jacoflow.track.GradientTracker`.
 
-Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method" (IPSJ). The
-wheel is built without it; `maturin develop --features reference` builds it.
+Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method" (IPSJ). A
+user's wheel is built without it; `maturin develop --features reference` builds it.
 """
 
 from __future__ import annotations
@@ -155,8 +155,10 @@ class MeanFlow:
 def mean_flow(flow: PixelFlow, min_speed: float = 0.5) -> MeanFlow:
     """Mean over the valid pixels of a field (H, W) whose flow along x or along y is at least `min_speed` px/frame: one set for both axes (11).
 
-    Raises `ValueError` for a negative `min_speed` and for arrays of another shape.
+    Raises `TypeError` for another object, `ValueError` for a negative `min_speed` and for arrays of another shape.
     """
+    if not isinstance(flow, PixelFlow):
+        raise TypeError(f"flow: expected a PixelFlow, got {type(flow).__name__}")
     field, valid = np.ascontiguousarray(flow.flow, float), np.ascontiguousarray(flow.valid, bool)
     if field.ndim != 3 or field.shape[2] != 2:
         raise ValueError(f"flow: expected a field (H, W, 2), got shape {field.shape}")

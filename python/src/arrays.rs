@@ -160,18 +160,19 @@ impl<'py> Frames<'py> {
             ColourRule::Luminance => "a list of frames or a stack (T, H, W) or (T, H, W, 3 or 4)",
         };
         let refuse = |advice: &str| {
-            Err(PyValueError::new_err(format!("frames: expected {wanted}, got an array of shape {shape:?}{advice}")))
+            let message = format!("frames: expected {wanted}, got an array of shape {shape:?}{advice}");
+            Err(PyValueError::new_err(message).into())
         };
         match shape[..] {
-            [_, rows, 3 | 4] if rows > 4 => Ok(refuse(
+            [_, rows, 3 | 4] if rows > 4 => refuse(
                 ", which looks like one colour image; pass a list of frames, or a stack (T, H, W, 3) with colour=\"luminance\"",
-            )?),
+            ),
             [count, _, _] => Ok(Self { count, object: array.into_any(), colour, is_array: true }),
             [count, _, _, 3 | 4] if colour == ColourRule::Luminance => {
                 Ok(Self { count, object: array.into_any(), colour, is_array: true })
             }
-            [_, _, _, 3 | 4] => Ok(refuse("; for colour frames pass colour=\"luminance\"")?),
-            _ => Ok(refuse("")?),
+            [_, _, _, 3 | 4] => refuse("; for colour frames pass colour=\"luminance\""),
+            _ => refuse(""),
         }
     }
 

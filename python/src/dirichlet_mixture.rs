@@ -4,6 +4,7 @@
 use super::arrays;
 use super::mixture::{Sample, count, covariance_prior, densities_and_shares, entry, numbers, shares};
 use crate::errors::Outcome;
+use crate::options::{self, Integer};
 use jacoflow::error::Error;
 use jacoflow::mixture::{DirichletMixture, DirichletOptions, Inference, fit_dirichlet, fit_dirichlet_from};
 use jacoflow::parallel::Threads;
@@ -96,11 +97,11 @@ pub fn mixture_dirichlet_densities<'py>(
     py: Python<'py>,
     points: &Bound<'py, PyAny>,
     components: &Bound<'py, PyDict>,
-    threads: Option<usize>,
+    threads: Option<Integer>,
 ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let sample = Sample::new(points, None)?;
     let mixture = mixture(components)?;
-    let threads = Threads::new(threads)?;
+    let threads = options::threads(threads)?;
     let (sums, shares) = py.detach(|| threads.install(|| mixture.log_densities(&sample.points())))?;
     densities_and_shares(py, sums, shares)
 }

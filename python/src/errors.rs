@@ -27,7 +27,8 @@ create_exception!(
     "A program or optional package that the request needs is not installed."
 );
 
-/// An exception to raise: an error of the library, or one of the interpreter's.
+/// An exception to raise: an error of the library, or one of the interpreter's. Neither type is of this
+/// crate, so that one cannot be converted into the other without a third.
 #[derive(Debug)]
 pub struct Raised(PyErr);
 
@@ -67,7 +68,6 @@ impl From<Error> for Raised {
             Error::Numerical(_) => NumericalError::new_err(message),
             Error::Missing(_) => MissingDependencyError::new_err(message),
             Error::Interrupted => PyKeyboardInterrupt::new_err(()),
-            _ => JacoflowError::new_err(message),
         })
     }
 }

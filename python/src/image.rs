@@ -2,12 +2,13 @@
 
 use super::arrays::{self, ColourRule};
 use crate::errors::Outcome;
+use crate::options::{self, Integer};
 use jacoflow::image::{Border, GaussianSmoother, Quantiser};
-use jacoflow::parallel::Threads;
 use jacoflow::types::AnyFrame;
 use pyo3::prelude::*;
 
-/// `$result`, computed from the frame in working precision: float64 for float64 frames, else float32.
+/// `$result`, computed from the frame in working precision: float64 for float64 frames, else float32. A
+/// macro, since the library keeps the bound of its generic functions to itself.
 macro_rules! in_precision {
     ($given:expr, $frame:ident => $result:expr) => {
         match $given {
@@ -31,7 +32,7 @@ pub fn smooth<'py>(
     frame: &Bound<'py, PyAny>,
     blur_sigma: f64,
     truncate: Option<f64>,
-    threads: Option<usize>,
+    threads: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let py = frame.py();
     let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
@@ -40,7 +41,7 @@ pub fn smooth<'py>(
         Some(truncate) => GaussianSmoother::with(blur_sigma, truncate, Border::Reflect),
     };
     let smoother = smoother.map_err(|e| renamed(e, "smooth", "blur_sigma"))?;
-    let threads = Threads::new(threads)?;
+    let threads = options::threads(threads)?;
     let smooth = py.detach(|| in_precision!(&frame, frame => threads.install(|| smoother.apply(frame))));
     arrays::from_any_frame(py, smooth)
 }
@@ -74,6 +75,9 @@ pub fn renamed(error: jacoflow::Error, core: &str, here: &'static str) -> jacofl
     match error {
         jacoflow::Error::Argument { argument, expected, got } if argument == core => {
             jacoflow::Error::Argument { argument: here, expected, got }
+        }
+        jacoflow::Error::Type { argument, expected, got } if argument == core => {
+            jacoflow::Error::Type { argument: here, expected, got }
         }
         other => other,
     }

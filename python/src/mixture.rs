@@ -3,6 +3,7 @@
 
 use super::arrays;
 use crate::errors::Outcome;
+use crate::options::{self, Integer};
 use jacoflow::error::Error;
 use jacoflow::mixture::{
     CovariancePrior, Fit, MixtureOptions, Moments, Points, Posterior, Prior, Retained, Seeding, Start, fit, partial_fit,
@@ -224,11 +225,11 @@ pub fn mixture_densities<'py>(
     py: Python<'py>,
     points: &Bound<'py, PyAny>,
     components: &Bound<'py, PyDict>,
-    threads: Option<usize>,
+    threads: Option<Integer>,
 ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let sample = Sample::new(points, None)?;
     let components = posterior(components)?;
-    let threads = Threads::new(threads)?;
+    let threads = options::threads(threads)?;
     let (sums, shares) = py.detach(|| threads.install(|| components.log_densities(&sample.points())))?;
     densities_and_shares(py, sums, shares)
 }

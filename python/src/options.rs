@@ -81,11 +81,11 @@ impl<'py> Group<'py> {
     pub fn get<T: FromPyObjectOwned<'py>>(&self, name: &str) -> Outcome<Option<T>> {
         let Some(object) = &self.0 else { return Ok(None) };
         let Some(value) = object.getattr_opt(name)?.filter(|value| !value.is_none()) else { return Ok(None) };
-        Ok(value.extract().map(Some).map_err(|error| {
+        value.extract().map(Some).map_err(|error| {
             let message = Into::<PyErr>::into(error).value(object.py()).to_string();
             let is_named = message.starts_with(&format!("{name}: "));
-            PyTypeError::new_err(if is_named { message } else { format!("{name}: {message}") })
-        })?)
+            PyTypeError::new_err(if is_named { message } else { format!("{name}: {message}") }).into()
+        })
     }
 }
 

@@ -2,10 +2,10 @@
 
 use super::arrays::{self, ColourRule};
 use crate::errors::Outcome;
+use crate::options::{self, Integer};
 use jacoflow::error::Error;
 use jacoflow::flow::points::{PointFlowOptions, PointPyramid, track_points};
 use jacoflow::image::{CornerOptions, corner_score, select_corners};
-use jacoflow::parallel::Threads;
 use jacoflow::types::Frame;
 use pyo3::prelude::*;
 
@@ -49,10 +49,10 @@ pub fn corners<'py>(
     min_distance: f64,
     window: usize,
     existing: Option<Bound<'py, PyAny>>,
-    threads: Option<usize>,
+    threads: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let py = frame.py();
-    let threads = Threads::new(threads)?;
+    let threads = options::threads(threads)?;
     let options = CornerOptions { max_count, quality, min_distance, ..CornerOptions::default() };
     options.check()?;
     let existing = existing.map_or(Ok(Vec::new()), |existing| points("existing", &existing))?;
@@ -103,10 +103,10 @@ pub fn point_flow<'py>(
     min_step: f64,
     forward_backward: Option<f64>,
     min_eigenvalue: Option<f64>,
-    threads: Option<usize>,
+    threads: Option<Integer>,
 ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let py = before.py();
-    let threads = Threads::new(threads)?;
+    let threads = options::threads(threads)?;
     let (before, after) = (grey("before", before)?, grey("after", after)?);
     let points = self::points("points", points)?;
     let guesses = guesses.map(|guesses| self::points("guesses", &guesses)).transpose()?;

@@ -1,7 +1,7 @@
 //! `jacoflow.scenes`: moving pictures with exact truth.
 
 use super::arrays::{self, ColourRule};
-use super::{field::FlowField, options::Integer};
+use super::{field::FlowField, options::Integer, options::count};
 use crate::errors::Outcome;
 use crate::keywords::getters;
 use jacoflow::error::Error;
@@ -53,8 +53,8 @@ impl Scene {
     #[pyo3(signature = (name, *, width=None, height=None, origin=None, random_state=None, carrier=None, **parameters))]
     fn new(
         name: String,
-        width: Option<usize>,
-        height: Option<usize>,
+        width: Option<Integer>,
+        height: Option<Integer>,
         origin: Option<(f64, f64)>,
         random_state: Option<u64>,
         carrier: Option<String>,
@@ -65,8 +65,8 @@ impl Scene {
             parameters.iter().map(|(name, value)| Ok((name.extract()?, value.extract()?))).collect::<Outcome<_>>()
         })?;
         let options = SceneOptions {
-            width: width.unwrap_or(default.width),
-            height: height.unwrap_or(default.height),
+            width: width.map_or(Ok(default.width), |n| count("width", n))?,
+            height: height.map_or(Ok(default.height), |n| count("height", n))?,
             origin: origin.unwrap_or(default.origin),
             random_state: random_state.unwrap_or(default.random_state),
             carrier,

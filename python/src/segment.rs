@@ -2,6 +2,7 @@
 
 use super::arrays;
 use crate::errors::Outcome;
+use crate::options::{self, Integer};
 use jacoflow::error::{Error, Result};
 use jacoflow::parallel::Threads;
 use jacoflow::segment::{EdgeWeight, SegmentImage, SegmentOptions, felzenszwalb, region_means};
@@ -47,10 +48,10 @@ pub fn segment_felzenszwalb<'py>(
     scale: f64,
     sigma: f64,
     min_size: i64,
-    threads: Option<usize>,
+    threads: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let py = image.py();
-    let threads = Threads::new(threads)?;
+    let threads = options::threads(threads)?;
     let min_size = usize::try_from(min_size)
         .map_err(|_| Error::argument("min_size", "a number of pixels, at least 0", min_size))?;
     let options = SegmentOptions { scale, sigma, min_size };

@@ -2,9 +2,9 @@
 
 use super::arrays::{self, ColourRule};
 use crate::errors::Outcome;
+use crate::options::{self, Integer};
 use jacoflow::error::{Error, Result};
 use jacoflow::io::{DisparityFormat, DisparityMap};
-use jacoflow::parallel::Threads;
 use jacoflow::stereo::{self, EdgeDisparityOptions, EdgeMap, EdgeSettings, Method, RowOffset};
 use jacoflow::track::GreyLevels;
 use jacoflow::types::{AnyFrame, Frame};
@@ -41,7 +41,7 @@ struct Search {
     classes: usize,
     window: usize,
     min_support: f64,
-    threads: Option<usize>,
+    threads: Option<Integer>,
 }
 
 /// The keyword options of `edge_disparity` alone.
@@ -66,7 +66,7 @@ impl Search {
             classes: self.classes,
             window: self.window,
             min_support: self.min_support,
-            threads: Threads::new(self.threads)?,
+            threads: options::threads(self.threads)?,
             ..EdgeDisparityOptions::default()
         })
     }
@@ -136,10 +136,10 @@ pub fn edge_pixels<'py>(
     view: &Bound<'py, PyAny>,
     blur_sigma: f64,
     threshold: f64,
-    threads: Option<usize>,
+    threads: Option<Integer>,
 ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let py = view.py();
-    let threads = Threads::new(threads)?;
+    let threads = options::threads(threads)?;
     let options = EdgeDisparityOptions { blur_sigma, threshold, ..EdgeDisparityOptions::default() };
     options.check()?;
     let [view] = grey_levels([("view", view)])?;

@@ -52,6 +52,5 @@ pub use extended::ExtendedFilter;
 pub use kalman::KalmanFilter;
 pub use scalar::update_by_scalar;
 pub use sigma_points::SigmaPoints;
-pub use state::GaussianState;
-pub use state::{check_covariances, check_dimension, check_mean};
+pub use state::{GaussianState, check_covariances, check_dimension, check_mean};
 pub use unscented::UnscentedFilter;

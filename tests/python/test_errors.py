@@ -284,3 +284,26 @@ def test_noise_that_no_covariance_can_hold_is_refused(method):
 def test_a_lone_frame_names_how_many_suffice(method, needed):
     with pytest.raises(ValueError, match=f"frames: expected at least {needed} frames, got 1 frames"):
         jacoflow.estimate([GOOD[0]], method=method)
+
+
+@pytest.mark.parametrize(
+    ("call", "argument"),
+    [
+        (lambda: jacoflow.smooth(GOOD[0], 1.0, threads=-1), "threads"),
+        (lambda: jacoflow.corners(GOOD[0], threads=-1), "threads"),
+        (lambda: jacoflow.segment.felzenszwalb(np.zeros((8, 10, 3), np.uint8), threads=-1), "threads"),
+        (lambda: jacoflow.stereo.edge_pixels(GOOD[0], threads=-1), "threads"),
+        (lambda: jacoflow.track.StereoTracker(threads=-1), "threads"),
+        (lambda: scenes.Scene("vortex", width=-1), "width"),
+    ],
+)
+def test_negative_counts_are_named(call, argument):
+    with pytest.raises(ValueError, match=f"^{argument}: expected .*, got -1$"):
+        call()
+
+
+def test_a_frame_of_another_dtype_is_the_frame_that_was_pushed():
+    estimator = FlowEstimator()
+    estimator.push(GOOD[0])
+    with pytest.raises(TypeError, match="^frame: expected uint8 like the first frame, got uint16"):
+        estimator.push(GOOD[1].astype(np.uint16))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import jacoflow
 from jacoflow import _jacoflow, reference, track
 
 from benchmarks.scenes import tracking as tracking_scenes
@@ -200,3 +201,14 @@ def test_huge_windows_are_clipped():
 def test_errors_name_the_argument(name, value):
     with pytest.raises(ValueError, match=f"^{name}: expected"):
         reference.ReferenceTracker(FRAME, (20, 20, 13, 13), **{name: value})
+
+
+def test_a_field_that_is_none_is_named():
+    with pytest.raises(TypeError, match="^flow: expected a PixelFlow, got NoneType"):
+        reference.mean_flow(None)
+
+
+def test_a_build_without_the_loop_says_so(monkeypatch):
+    monkeypatch.delattr(_jacoflow, "_reference_tracker")
+    with pytest.raises(jacoflow.MissingDependencyError, match="expected a build with the feature `reference`"):
+        reference.ReferenceTracker(FRAME, (20, 20, 13, 13))

@@ -36,7 +36,6 @@ pub fn name_of(path: &Path) -> String {
 }
 
 /// The files of [`SOURCES`].
-#[allow(dead_code, reason = "one of the tests that share this file has no use for it")]
 pub fn rust_files() -> Vec<PathBuf> {
     SOURCES.iter().flat_map(|folder| files(&root().join(folder), "rs")).collect()
 }

@@ -1,9 +1,10 @@
 //! Options of the particle tracker as Python gives them.
 
+use crate::errors::Outcome;
+use crate::options::{self, Integer};
 use crate::track::word;
-use jacoflow::error::{Error, Result};
+use jacoflow::error::Error;
 use jacoflow::filter::particle::Resampling;
-use jacoflow::parallel::Threads;
 use jacoflow::segment::SegmentOptions;
 use jacoflow::track::particle::{ForegroundModel, Likelihoods, ParticleMode, ParticleOptions};
 use pyo3::prelude::*;
@@ -24,12 +25,12 @@ pub(super) struct Given {
     segmentation: (f64, f64, Option<usize>),
     grey: String,
     random_state: u64,
-    threads: Option<usize>,
+    threads: Option<Integer>,
 }
 
 impl Given {
     /// The core's options, and whether grey frames are taken.
-    pub(super) fn options(self) -> Result<(ParticleOptions, bool)> {
+    pub(super) fn options(self) -> Outcome<(ParticleOptions, bool)> {
         let takes_grey = word("grey", &self.grey, &[("error", false), ("value", true)])?;
         let (scale, sigma, min_size) = self.segmentation;
         // Its names are entries of the option, not options.
@@ -56,7 +57,7 @@ impl Given {
             segment_sigma: sigma,
             segment_min_size: min_size,
             random_state: self.random_state,
-            threads: Threads::new(self.threads)?,
+            threads: options::threads(self.threads)?,
         };
         options.check()?;
         Ok((options, takes_grey))

@@ -1,7 +1,7 @@
 //! Options of the stereo tracker as Python gives them.
 
 use crate::errors::Outcome;
-use jacoflow::parallel::Threads;
+use crate::options::{self, Integer};
 use jacoflow::track::stereo::{StereoCamera, StereoMode, StereoTrackerOptions};
 use pyo3::prelude::*;
 
@@ -20,7 +20,7 @@ pub(super) struct Given {
     camera: Option<(f64, f64, f64)>,
     step_time: f64,
     random_state: u64,
-    threads: Option<usize>,
+    threads: Option<Integer>,
 }
 
 impl Given {
@@ -38,7 +38,7 @@ impl Given {
         options.camera = self.camera.map(|(focal, baseline, d_infinity)| StereoCamera { focal, baseline, d_infinity });
         options.step_time = self.step_time;
         options.random_state = self.random_state;
-        options.threads = Threads::new(self.threads)?;
+        options.threads = options::threads(self.threads)?;
         options.check()?;
         Ok(options)
     }

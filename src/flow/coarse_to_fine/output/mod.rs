@@ -10,6 +10,7 @@ use super::planes::{Planes, SITE_SPACING};
 use super::refine::{SITES_PER_NODE, WindowStatistics};
 use super::resample::{finer, motion_at};
 use super::variational::PixelMotion;
+use crate::ablation::keeps;
 use crate::flow::coarse_to_fine::{resample::first_frame::at_first_frame, resample::rows::RowReader};
 use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{FieldBand, bands};
@@ -164,7 +165,7 @@ impl<T: SimdReal> Writer<'_, T> {
         for (flow, moves) in band.motion.iter_mut().zip(moves) {
             flow[places.clone()].iter_mut().zip(moves.iter().step_by(step)).for_each(|(flow, &by)| *flow += by);
         }
-        for (_, planes) in self.spreads(band) {
+        for (_, planes) in self.spreads(band).filter(|_| keeps("flow.refinement_error")) {
             for (i, j) in [(0, 0), (0, 1), (1, 1)] {
                 let products = moves[i].iter().zip(moves[j]).map(|(&a, &b)| a * b).step_by(step);
                 planes[upper(i, j)][places.clone()].iter_mut().zip(products).for_each(|(entry, by)| *entry += by);
