@@ -5,9 +5,10 @@ speed of the extension module.
 
 Crates that the library depends on are compiled once and left out of the cost, in a folder that is deleted at
 the end. Settings apply to the library alone. Columns: CPU seconds of the compiler on library and binding, of all
-its threads; size of the module, stripped as in the wheel, MB; CPU time of one flow estimate on one thread over that of the first variant. The estimates
-of the variants take turns, and the least time of each counts. Where two hardware threads share a core, CPU
-times nearly double while the other one works: run it on a quiet machine. Needs cargo, `strip` and numpy.
+its threads; size of the module, stripped as in the wheel, MB; CPU time of one flow estimate on one thread over
+that of the first variant. The estimates of the variants take turns, and the least time of each counts. Where two
+hardware threads share a core, CPU times nearly double while the other one works: run it on a quiet machine. Needs
+cargo, `strip` and numpy.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ def used() -> float:
 
 
 def compiled(name: str, scratch: Path) -> tuple[float, float]:
-    """CPU seconds of the compiler on the library and the binding, and MB; leaves the package in a folder of that name."""
+    """CPU seconds of the compiler on library and binding, and MB; leaves the package in a folder of that name."""
     target, into, seconds = scratch / "target", scratch / name, scratch / "seconds"
     settings = [part for setting in VARIANTS[name] for part in ("--config", f"profile.ci.{setting}")]
     wrapper = scratch / "wrapper"
