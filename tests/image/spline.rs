@@ -85,12 +85,16 @@ macro_rules! check_against_the_definition {
         for (w, h) in SIZES {
             let frame = noise::<T>(w, h);
             let coefficients = naive_coefficients(&frame);
-            let (x, y) = (positions::<T>(203, w, 1), positions::<T>(203, h, 2));
-            for level in Level::available() {
+            let anywhere = (positions::<T>(203, w, 1), positions::<T>(203, h, 2));
+            // Side by side on a row, as flow without much change has them.
+            let column = |i: usize| T::from_f64(i as f64 % w as f64 + 0.3);
+            let side_by_side = ((0..203).map(column).collect::<Vec<T>>(), vec![T::from_f64(0.6 * (h - 1) as f64); 203]);
+            let all = [&anywhere, &side_by_side];
+            for (level, (x, y)) in Level::available().into_iter().flat_map(|level| all.map(|places| (level, places))) {
                 let spline = Spline::new(level, &frame);
                 for count in [0, 1, 3, 8, 21, 203] {
                     let mut out = vec![T::nan(); count];
-                    spline.sample_row(level, &x, &y, &mut out);
+                    spline.sample_row(level, x, y, &mut out);
                     for i in 0..count {
                         let want = naive_value(&coefficients, x[i].to_f64(), y[i].to_f64());
                         assert!((out[i].to_f64() - want).abs() < $tolerance, "{w} x {h}, {level:?}: {} {want}", out[i]);

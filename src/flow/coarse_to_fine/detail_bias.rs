@@ -139,7 +139,7 @@ fn node_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, size: (usize, us
         sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += weight * part);
     };
     let row = |y: usize| {
-        let sites: Vec<NodeSums> = (0..data.width).map(|x| at_site(data, motion, (x, y))).collect();
+        let sites = site_sums(data, motion, y);
         let node = |n: usize| {
             let mut sum = NodeSums::default();
             sites_around(n, data.width).for_each(|(x, weight)| add(&mut sum, weight, &sites[x]));
@@ -156,12 +156,19 @@ fn node_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, size: (usize, us
     (0..size.0 * size.1).into_par_iter().map(nodes).collect()
 }
 
-/// Normal equations of one site for the flow that its motion leaves.
-fn at_site<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, (x, y): (usize, usize)) -> NodeSums {
-    let known: [f64; MOTION] = std::array::from_fn(|k| motion.at(k, x, y).to_f64());
-    let at = |k: usize| data.at(k, x, y).to_f64();
-    let left = |c: usize| at(right(c)) - (0..MOTION).map(|k| at(normal(c, k)) * known[k]).sum::<f64>();
-    [at(normal(0, 0)), at(normal(0, 1)), at(normal(1, 1)), left(0), left(1), at(ERROR)]
+/// Normal equations of the sites of a row for the flow that their motion leaves.
+fn site_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, y: usize) -> Vec<NodeSums> {
+    let known: [&[T]; MOTION] = std::array::from_fn(|k| motion.line(k, y));
+    let normals = [0, 1].map(|c| std::array::from_fn::<_, MOTION, _>(|k| data.line(normal(c, k), y)));
+    let [right_u, right_v, errors] = [right(0), right(1), ERROR].map(|k| data.line(k, y));
+    let site = |x: usize| {
+        let left = |c: usize, right: &[T]| {
+            right[x].to_f64() - (0..MOTION).map(|k| normals[c][k][x].to_f64() * known[k][x].to_f64()).sum::<f64>()
+        };
+        let [a, b, c] = [normals[0][0], normals[0][1], normals[1][1]].map(|line| line[x].to_f64());
+        [a, b, c, left(0, right_u), left(1, right_v), errors[x].to_f64()]
+    };
+    (0..data.width).map(site).collect()
 }
 
 /// What the second sums say of the flow beyond the first, px.

@@ -1,7 +1,8 @@
 //! Four rows of four neighbours for every lane, summed down their columns.
 //!
 //! Hardware gathers take as long as one load a value. A patch row is contiguous: here it is one load, and the
-//! four lanes' sums are transposed at the end.
+//! four lanes' sums are transposed at the end. Where the lanes' patches are adjacent, a row of all is one
+//! load.
 //!
 //! # Safety
 //! As in the parent module: these functions are reached only through lane types, which exist only on
@@ -59,6 +60,30 @@ macro_rules! patch {
     }};
 }
 
+/// Whether every patch begins one column right of the one before, as along a row that moves together.
+#[inline(always)]
+fn are_adjacent<const LANES: usize>(columns: &[i32; LANES], rows: &[i32; LANES]) -> bool {
+    let apart = |l: usize| columns[l].wrapping_sub(columns[0]).wrapping_sub(l as i32) | (rows[l] ^ rows[0]);
+    (0..LANES).fold(0, |so_far, l| so_far | apart(l)) == 0
+}
+
+/// The sums of adjacent patches, which share their rows: one load for all lanes.
+macro_rules! adjacent {
+    ($load:ident, $mul:ident, $fmadd:ident, $plane:ident, $stride:ident, $columns:ident, $rows:ident, $weights:ident) => {{
+        // Where the first and the last lie inside the plane, so do those between.
+        start($plane.len(), $stride, $columns[$columns.len() - 1], $rows[0]);
+        let first = $plane.as_ptr().add(start($plane.len(), $stride, $columns[0], $rows[0]));
+        let mut sums = $weights;
+        for k in 0..4 {
+            let sum = $mul($load(first.add(k)), $weights[0]);
+            let sum = $fmadd($load(first.add($stride + k)), $weights[1], sum);
+            let sum = $fmadd($load(first.add(2 * $stride + k)), $weights[2], sum);
+            sums[k] = $fmadd($load(first.add(3 * $stride + k)), $weights[3], sum);
+        }
+        sums
+    }};
+}
+
 /// The four column sums of the patch of each of eight singles; panics where a patch leaves the plane.
 ///
 /// # Safety
@@ -76,6 +101,9 @@ pub(super) unsafe fn f32x8(
     unsafe {
         _mm256_storeu_si256(columns.as_mut_ptr().cast(), _mm256_cvttps_epi32(column));
         _mm256_storeu_si256(rows.as_mut_ptr().cast(), _mm256_cvttps_epi32(row));
+        if are_adjacent(&columns, &rows) {
+            return adjacent!(_mm256_loadu_ps, _mm256_mul_ps, _mm256_fmadd_ps, plane, stride, columns, rows, weights);
+        }
         for j in 0..4 {
             _mm256_storeu_ps(down[j].as_mut_ptr(), weights[j]);
         }
@@ -113,6 +141,9 @@ pub(super) unsafe fn f32x16(
     unsafe {
         _mm512_storeu_si512(columns.as_mut_ptr().cast(), _mm512_cvttps_epi32(column));
         _mm512_storeu_si512(rows.as_mut_ptr().cast(), _mm512_cvttps_epi32(row));
+        if are_adjacent(&columns, &rows) {
+            return adjacent!(_mm512_loadu_ps, _mm512_mul_ps, _mm512_fmadd_ps, plane, stride, columns, rows, weights);
+        }
         for j in 0..4 {
             _mm512_storeu_ps(down[j].as_mut_ptr(), weights[j]);
         }
@@ -170,6 +201,9 @@ pub(super) unsafe fn f64x4(
     unsafe {
         _mm_storeu_si128(columns.as_mut_ptr().cast(), _mm256_cvttpd_epi32(column));
         _mm_storeu_si128(rows.as_mut_ptr().cast(), _mm256_cvttpd_epi32(row));
+        if are_adjacent(&columns, &rows) {
+            return adjacent!(_mm256_loadu_pd, _mm256_mul_pd, _mm256_fmadd_pd, plane, stride, columns, rows, weights);
+        }
         for j in 0..4 {
             _mm256_storeu_pd(down[j].as_mut_ptr(), weights[j]);
         }
@@ -198,6 +232,9 @@ pub(super) unsafe fn f64x8(
     unsafe {
         _mm256_storeu_si256(columns.as_mut_ptr().cast(), _mm512_cvttpd_epi32(column));
         _mm256_storeu_si256(rows.as_mut_ptr().cast(), _mm512_cvttpd_epi32(row));
+        if are_adjacent(&columns, &rows) {
+            return adjacent!(_mm512_loadu_pd, _mm512_mul_pd, _mm512_fmadd_pd, plane, stride, columns, rows, weights);
+        }
         for j in 0..4 {
             _mm512_storeu_pd(down[j].as_mut_ptr(), weights[j]);
         }

@@ -106,7 +106,9 @@ impl<T: SimdReal> Band<'_, T> {
         let uv = &mut image[columns.row(2)..columns.row(4)];
         dense_row::<V>(self.task.motion, y, columns, self.scratch.sites.all(), uv);
         let place = (self.task.size, y);
-        warp_row::<T, V>(self.task.views, place, columns, self.scratch.frame.all(), image);
+        let (number, inside) = self.scratch.frame.all().split_at(columns.row(1));
+        let rows = (self.scratch.in_order.all(), image);
+        warp_row::<T, V>(self.task.views, place, columns, [number, inside], rows);
     }
 
     #[inline(always)]

@@ -77,6 +77,8 @@ impl<T: SimdReal> Buffer<T> {
 
 /// Planes of an image row: `A`, `R`, `u`, `v`, validity.
 pub(super) const IMAGE: usize = 5;
+/// Planes of an image row in the order of its columns: `u, v, A, R`, validity.
+pub(super) const IN_ORDER: usize = 5;
 /// Planes of the vertical stencils: `A` by b, d, s and `R` by b, d.
 pub(super) const STENCIL: usize = 5;
 /// Planes of products: `P_uu, P_uv, P_vv, q_u, q_v, e`, validity.
@@ -88,8 +90,10 @@ pub(super) const VERTICAL: usize = 3;
 pub(super) struct Scratch<T> {
     columns: Columns,
     radius: usize,
-    /// Column numbers, and 1 inside the border, 0 on it and beyond.
+    /// Column numbers, and 1 inside the border, 0 on it and beyond; in the order of the columns.
     pub frame: Buffer<T>,
+    /// Planes of a row in the order of the columns.
+    pub in_order: Buffer<T>,
     /// `u, u_x, v, v_x` on the site columns of a pixel row: halves, not rows.
     pub sites: Buffer<T>,
     pub images: Buffer<T>,
@@ -106,19 +110,17 @@ impl<T: SimdReal> Scratch<T> {
         }
         (self.columns, self.radius) = (columns, radius);
         self.frame.clear(columns.row(2));
+        self.in_order.clear(columns.row(IN_ORDER));
         self.sites.clear(4 * columns.half);
         self.images.clear(RING * columns.row(IMAGE));
         self.stencil.clear(columns.row(STENCIL));
         self.products.clear((2 * radius + 1) * columns.row(PRODUCTS));
         self.vertical.clear(columns.row(VERTICAL));
-        let frame = self.frame.all();
-        for h in 0..2 {
-            let (number, inside) = (columns.samples(0, h).start, columns.samples(1, h).start);
-            for i in 0..columns.count {
-                let x = 2 * (columns.first + i) + h;
-                frame[number + i] = T::from_f64(x as f64);
-                frame[inside + i] = T::from_f64(f64::from(u8::from(x >= 1 && x + 1 < columns.width)));
-            }
+        let (number, inside) = self.frame.all().split_at_mut(columns.row(1));
+        for i in 0..2 * columns.count {
+            let x = 2 * columns.first + i;
+            number[i] = T::from_f64(x as f64);
+            inside[i] = T::from_f64(f64::from(u8::from(x >= 1 && x + 1 < columns.width)));
         }
     }
 }

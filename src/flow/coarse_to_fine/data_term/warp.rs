@@ -1,6 +1,6 @@
 //! Views along the motion: their mean, their rate, and where all of them are usable.
 
-use super::{View, scratch::Columns};
+use super::{View, scratch::Columns, scratch::IN_ORDER, scratch::LEFT};
 use crate::simd::{Lanes, SimdReal};
 use crate::types::Mask;
 
@@ -8,28 +8,41 @@ use crate::types::Mask;
 const MAX_LANES: usize = 16;
 
 /// Mean and rate of the views in row `y` of a level, and 1 where every view is usable, to a row `image` of
-/// the planes `A, R, u, v`, validity, of which `u` and `v` are given.
+/// the planes `A, R, u, v`, validity, of which `u` and `v` are given. `frame`: numbers of the columns, and 1
+/// inside the border.
 #[inline(always)]
 pub(super) fn warp_row<T: SimdReal, V: Lanes<Scalar = T>>(
     views: &[View<'_, T>],
     (size, y): ((usize, usize), usize),
     columns: &Columns,
-    frame: &[T],
-    image: &mut [T],
+    frame: [&[T]; 2],
+    (in_order, image): (&mut [T], &mut [T]),
 ) {
-    let row = V::constant(y as f64);
-    for h in 0..2 {
-        let n = columns.count;
-        let (number, inside) = (&frame[columns.samples(0, h)][..n], &frame[columns.samples(1, h)][..n]);
-        let [mean, rate, u, v, valid] = planes(columns, h, image);
-        let mut at = 0;
-        while at + V::LANES <= n {
-            let (u, v, column) = (V::load(&u[at..]), V::load(&v[at..]), V::load(&number[at..]));
-            let [a, r, seen] = sample_views(views, size, [column, row], [u, v], V::load(&inside[at..]));
-            a.store(&mut mean[at..]);
-            r.store(&mut rate[at..]);
-            seen.store(&mut valid[at..]);
-            at += V::LANES;
+    let (row, n) = (V::constant(y as f64), 2 * columns.count);
+    // In the order of the columns, neighbours read neighbouring pixels, which is one load for all.
+    let [u, v, mean, rate, valid]: [&mut [T]; IN_ORDER] = lines(in_order, columns.row(1), n);
+    let halves = |k: usize| [0, 1].map(|h| columns.samples(k, h));
+    for (line, k) in [&mut *u, &mut *v].into_iter().zip([2, 3]) {
+        let [even, odd] = halves(k);
+        for (pair, (&even, &odd)) in line.chunks_exact_mut(2).zip(image[even].iter().zip(&image[odd])) {
+            pair.copy_from_slice(&[even, odd]);
+        }
+    }
+    let [number, inside] = frame.map(|line| &line[..n]);
+    let mut at = 0;
+    while at + V::LANES <= n {
+        let (u, v, column) = (V::load(&u[at..]), V::load(&v[at..]), V::load(&number[at..]));
+        let [a, r, seen] = sample_views(views, size, [column, row], [u, v], V::load(&inside[at..]));
+        a.store(&mut mean[at..]);
+        r.store(&mut rate[at..]);
+        seen.store(&mut valid[at..]);
+        at += V::LANES;
+    }
+    for (line, k) in [mean, rate, valid].into_iter().zip([0, 1, 4]) {
+        let (even, odd) = image.split_at_mut((2 * k + 1) * columns.half);
+        let (even, odd) = (&mut even[columns.samples(k, 0)], &mut odd[LEFT..LEFT + columns.count]);
+        for (pair, (even, odd)) in line.chunks_exact(2).zip(even.iter_mut().zip(odd)) {
+            (*even, *odd) = (pair[0], pair[1]);
         }
     }
 }
@@ -59,13 +72,13 @@ pub(in crate::flow::coarse_to_fine) fn sample_views<T: SimdReal, V: Lanes<Scalar
     [mean, rate, seen]
 }
 
+/// The first `n` samples of every `stride`.
 #[inline(always)]
-fn planes<'a, T>(columns: &Columns, h: usize, image: &'a mut [T]) -> [&'a mut [T]; 5] {
-    let mut rest = image;
+fn lines<T, const COUNT: usize>(mut rest: &mut [T], stride: usize, n: usize) -> [&mut [T]; COUNT] {
     std::array::from_fn(|_| {
-        let (plane, after) = std::mem::take(&mut rest).split_at_mut(columns.row(1));
+        let (line, after) = std::mem::take(&mut rest).split_at_mut(stride);
         rest = after;
-        &mut plane[columns.samples(0, h)][..columns.count]
+        &mut line[..n]
     })
 }
 

@@ -1,7 +1,7 @@
 //! Planes of a tile: a part of the frame with what surrounds it, small enough for the nearer caches.
 
 use crate::flow::coarse_to_fine::planes::LEFT;
-use crate::simd::{Lanes, SimdReal};
+use crate::simd::SimdReal;
 use std::ops::Range;
 
 /// Size, pixels, of the part of a tile that it is solved for.
@@ -12,7 +12,14 @@ const HALO: usize = 8;
 /// Width of the strip around that, over which derivatives reach.
 pub(super) const RIM: usize = 4;
 
-/// Planes of a tile.
+/// Samples of a line, the same in every tile, so that the compiler knows where the next begins.
+const STRIDE: usize = (TILE_COLUMNS + 2 * HALO).next_multiple_of(LEFT) + 3 * LEFT;
+/// A row of a plane: the first column without rim is at [`LEFT`].
+pub(super) type Line<T> = [T; STRIDE];
+/// Row after row, the lines of `COUNT` planes.
+pub(super) type Rows<T, const COUNT: usize> = [[Line<T>; COUNT]];
+
+/// Planes of [`Tile::fields`].
 pub(super) const FLOW: usize = 0;
 /// Differences of the flow to the right and lower neighbours beyond those that the Jacobian implies.
 pub(super) const RIGHT: usize = 2;
@@ -28,30 +35,33 @@ pub(super) const XY: usize = 12;
 pub(super) const YY: usize = 13;
 /// 1 where the views are usable.
 pub(super) const SEEN: usize = 14;
-/// The increment, and the same before or after half a sweep.
-pub(super) const D: usize = 15;
-pub(super) const OTHER: usize = 17;
-/// The inverse matrices, the right sides and the weights of the neighbours.
-pub(super) const INVERSE: usize = 19;
-pub(super) const SIDE: usize = 22;
-pub(super) const WEIGHT: usize = 24;
-pub(super) const WEIGHT_RIGHT: usize = 25;
-pub(super) const WEIGHT_LOWER: usize = 26;
-const COUNT: usize = 27;
+const FIELDS: usize = 15;
 
-/// Samples of the largest tile, and of a vector after its last.
-pub(super) const SAMPLES: usize =
-    (TILE_COLUMNS + 2 * HALO + 2 * RIM + 3 * LEFT) * COUNT * (TILE_ROWS + 2 * HALO + 2 * RIM) + LEFT;
+/// Planes of [`Tile::system`]: the inverse matrices and the right sides.
+pub(super) const INVERSE: usize = 0;
+pub(super) const SIDE: usize = 3;
+pub(super) const SYSTEM: usize = 5;
+
+/// Planes of [`Tile::weights`]: those of the right and the lower neighbours.
+pub(super) const WEIGHT_RIGHT: usize = 0;
+pub(super) const WEIGHT_LOWER: usize = 1;
+
+const ROWS: usize = TILE_ROWS + 2 * HALO + 2 * RIM;
+/// Samples of a tile.
+pub(super) const SAMPLES: usize = ROWS * STRIDE * (FIELDS + SYSTEM + 2 + 2 * 2);
 
 /// Planes over a tile, its halo and its rim.
-#[derive(Debug)]
-pub(super) struct Tile<T> {
+pub(super) struct Tile<'a, T> {
     pub layout: Layout,
     pub columns: Columns<T>,
-    pub data: Vec<T>,
+    pub fields: &'a mut Rows<T, FIELDS>,
+    pub system: &'a mut Rows<T, SYSTEM>,
+    pub weights: &'a mut Rows<T, 2>,
+    /// The increment, and the same before or after half a sweep.
+    pub increment: [&'a mut Rows<T, 2>; 2],
 }
 
-/// Where the samples of a tile are: row after row, all planes of a row together.
+/// Where a tile lies. Rows are counted from the rim's first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
     pub frame: (usize, usize),
@@ -59,8 +69,6 @@ pub(super) struct Layout {
     pub origin: (usize, usize),
     /// Size with halo, without rim.
     pub size: (usize, usize),
-    /// Samples from a plane to the next.
-    pub stride: usize,
 }
 
 impl Layout {
@@ -68,20 +76,7 @@ impl Layout {
     fn new(frame: (usize, usize), columns: &Range<usize>, rows: &Range<usize>) -> Self {
         let reach = |range: &Range<usize>, end: usize| (range.start.saturating_sub(HALO), (range.end + HALO).min(end));
         let ((left, right), (top, bottom)) = (reach(columns, frame.0), reach(rows, frame.1));
-        let stride = (right - left + RIM).next_multiple_of(LEFT) + 2 * LEFT;
-        Self { frame, origin: (left, top), size: (right - left, bottom - top), stride }
-    }
-
-    /// Start of row `y` of plane `k`, counted from the rim's first row, at the first column without rim.
-    #[inline(always)]
-    pub fn at(&self, k: usize, y: usize) -> usize {
-        (y * COUNT + k) * self.stride + LEFT
-    }
-
-    /// Samples from a row to the next.
-    #[inline(always)]
-    pub fn down(&self) -> usize {
-        COUNT * self.stride
+        Self { frame, origin: (left, top), size: (right - left, bottom - top) }
     }
 
     /// Rows with halo, without rim.
@@ -102,51 +97,50 @@ impl Layout {
 }
 
 /// What is the same in all rows of a tile.
-#[derive(Debug)]
 pub(super) struct Columns<T> {
-    /// Column of the frame, from the rim's first; beyond the frame its outermost.
-    pub number: Vec<T>,
-    /// 1 on columns of the tile and its halo of even or odd number, from the halo's first.
-    pub even: Vec<T>,
-    pub odd: Vec<T>,
-    /// 1 on columns with a right neighbour in the frame, from the one before the halo.
-    pub has_right: Vec<T>,
+    /// Column of the frame; beyond the frame its outermost.
+    pub number: Line<T>,
+    /// 1 on columns of the tile and its halo of even or odd number.
+    pub even: Line<T>,
+    pub odd: Line<T>,
+    /// 1 on columns with a right neighbour in the frame.
+    pub has_right: Line<T>,
 }
 
 impl<T: SimdReal> Columns<T> {
     fn new(layout: Layout) -> Self {
-        let (first, width, last) = (layout.origin.0 as f64, layout.size.0, layout.frame.0 as f64 - 1.0);
-        let each = |value: &dyn Fn(usize) -> f64| (0..layout.stride).map(|at| T::from_f64(value(at))).collect();
-        let truth = |holds: bool| f64::from(u8::from(holds));
+        let (first, last) = (layout.origin.0 as f64 - LEFT as f64, layout.frame.0 as f64 - 1.0);
+        let inside = LEFT..LEFT + layout.size.0;
+        let truth = |holds: bool| T::from_f64(f64::from(u8::from(holds)));
         Self {
-            number: each(&|at| (first + at as f64 - RIM as f64).clamp(0.0, last)),
-            even: each(&|at| truth(at < width && at % 2 == 0)),
-            odd: each(&|at| truth(at < width && at % 2 == 1)),
-            has_right: each(&|at| truth(first + at as f64 >= 1.0 && first + (at as f64) < last + 1.0)),
+            number: std::array::from_fn(|at| T::from_f64((first + at as f64).clamp(0.0, last))),
+            even: std::array::from_fn(|at| truth(inside.contains(&at) && at % 2 == 0)),
+            odd: std::array::from_fn(|at| truth(inside.contains(&at) && at % 2 == 1)),
+            has_right: std::array::from_fn(|at| truth(first + at as f64 >= 0.0 && first + (at as f64) < last)),
         }
     }
 }
 
-impl<T: SimdReal> Tile<T> {
+impl<'a, T: SimdReal> Tile<'a, T> {
     /// The given columns and rows of a frame, with an increment of zero, in memory for [`SAMPLES`].
-    pub fn new(frame: (usize, usize), columns: &Range<usize>, rows: &Range<usize>, data: Vec<T>) -> Self {
+    pub fn new(frame: (usize, usize), columns: &Range<usize>, rows: &Range<usize>, memory: &'a mut [T]) -> Self {
         let layout = Layout::new(frame, columns, rows);
-        let mut tile = Self { layout, columns: Columns::new(layout), data };
-        let zero = T::from_f64(0.0);
-        for y in 0..layout.size.1 + 2 * RIM {
-            let at = layout.at(D, y) - LEFT;
-            tile.data[at..at + 4 * layout.stride].fill(zero);
+        let (lines, _) = memory.as_chunks_mut::<STRIDE>();
+        let (fields, lines) = lines.split_at_mut(ROWS * FIELDS);
+        let (system, lines) = lines.split_at_mut(ROWS * SYSTEM);
+        let (weights, lines) = lines.split_at_mut(ROWS * 2);
+        let (increment, lines) = lines.split_at_mut(ROWS * 2);
+        let other = &mut lines[..ROWS * 2];
+        for line in increment.iter_mut().chain(other.iter_mut()) {
+            line.fill(T::from_f64(0.0));
         }
-        tile
-    }
-
-    #[inline(always)]
-    pub fn load<V: Lanes<Scalar = T>>(&self, at: usize) -> V {
-        V::load(&self.data[at..])
-    }
-
-    #[inline(always)]
-    pub fn store<V: Lanes<Scalar = T>>(&mut self, at: usize, value: V) {
-        value.store(&mut self.data[at..]);
+        Self {
+            layout,
+            columns: Columns::new(layout),
+            fields: fields.as_chunks_mut().0,
+            system: system.as_chunks_mut().0,
+            weights: weights.as_chunks_mut().0,
+            increment: [increment.as_chunks_mut().0, other.as_chunks_mut().0],
+        }
     }
 }

@@ -1,7 +1,8 @@
 //! Variational refinement: flow at every pixel, moved where that explains the frames better than windows do.
 //!
 //! Windows cover several pixels, and at motion boundaries two motions. From the field's flow `w` and Jacobian
-//! `M`, the increment `d` at every pixel minimises the sum over the pixels `p` of
+//! `M`, the increment `d` at every pixel is taken from zero towards the minimum of the sum over the pixels
+//! `p` of
 //!
 //! ```text
 //! psi(r) + 2 psi(s) + 2 psi(D),   psi(x) = sqrt(x^2 + eps^2)
@@ -15,7 +16,7 @@
 //! Jacobian implies out of the difference `D`: affine motion costs nothing, and `d` is zero where the field
 //! is right.
 //!
-//! A pixel takes the share of `d` that the fall of the mean residual around it earns: noise, which windows
+//! A pixel takes the share of `d` that the fall of the mean of `|r|` around it earns: noise, which windows
 //! average better, lets it fall by chance, but little. The Jacobian stays that of the windows; the covariance
 //! of the flow gains the outer product of what the pixel moves by, since two estimates differ by it.
 

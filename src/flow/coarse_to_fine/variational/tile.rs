@@ -4,7 +4,7 @@
 
 use super::increment::solve;
 use super::layout::{
-    D, FLOW, INVERSE, LOWER, RATE, RATE_X, RATE_Y, RIGHT, RIM, SAMPLES, SEEN, TILE_COLUMNS, Tile, WEIGHT, WEIGHT_LOWER,
+    Columns, FLOW, INVERSE, LOWER, RATE, RATE_X, RATE_Y, RIGHT, RIM, SAMPLES, SEEN, TILE_COLUMNS, Tile, WEIGHT_LOWER,
     WEIGHT_RIGHT, X, XX, XY, Y, YY,
 };
 use crate::flow::coarse_to_fine::data_term::{View, sample_views};
@@ -21,7 +21,7 @@ const WHOLE_FALL: f64 = 0.1;
 
 /// In the memory of planes that are not needed at the same time: the mean brightness; residuals before and
 /// after, and their means down the columns.
-const MEAN: usize = WEIGHT;
+const MEAN: usize = WEIGHT_RIGHT;
 const BEFORE: usize = INVERSE;
 const AFTER: usize = INVERSE + 1;
 const BEFORE_DOWN: usize = WEIGHT_RIGHT;
@@ -47,66 +47,73 @@ impl<T: SimdReal> Kernel<T> for TileRow<'_, T> {
         let mut memory = space.samples(SAMPLES);
         for from in (0..start.width).step_by(TILE_COLUMNS) {
             let columns = from..(from + TILE_COLUMNS).min(start.width);
-            let mut tile = Tile::new((start.width, start.height), &columns, &rows, memory);
+            let mut tile = Tile::new((start.width, start.height), &columns, &rows, &mut memory);
             tile.begin::<V>(views, start);
             solve::<T, V>(&mut tile, contrast);
-            tile.finish::<V>(views, (&columns, &rows), out);
-            memory = tile.data;
+            tile.finish::<V>(&columns, &rows, out);
         }
         space.keep(Planes::of_samples(memory));
     }
 }
 
-impl<T: SimdReal> Tile<T> {
+impl<T: SimdReal> Tile<'_, T> {
     /// Flow, differences, and the views' mean and rate with their derivatives.
     #[inline(always)]
     fn begin<V: Lanes<Scalar = T>>(&mut self, views: &[View<'_, T>], start: &Planes<T>) {
-        let (width, height) = self.layout.size;
+        (0..self.layout.size.1 + 2 * RIM).for_each(|y| self.read(start, y));
+        let Tile { layout, columns, fields, weights, .. } = self;
+        let (height, end) = (layout.size.1, LEFT + layout.size.0);
         for y in 0..height + 2 * RIM {
-            self.read(start, y);
-            let row = V::constant(self.layout.row(y) as f64);
-            for x in (0..width + 2 * RIM).step_by(V::LANES) {
-                let at = |k: usize| self.layout.at(k, y) - RIM;
-                let column = V::load(&self.columns.number[x..]);
-                let flow = [self.load(at(FLOW) + x), self.load(at(FLOW + 1) + x)];
-                let [mean, rate, seen] = sample_views(views, self.layout.frame, [column, row], flow, V::constant(1.0));
-                let places = [at(MEAN) + x, at(RATE) + x, at(SEEN) + x];
-                for (place, value) in places.into_iter().zip([mean, rate, seen]) {
-                    self.store(place, value);
-                }
+            let row = V::constant(layout.row(y) as f64);
+            let (fields, means) = (&mut fields[y], &mut weights[y][MEAN]);
+            for x in (LEFT - RIM..end + RIM).step_by(V::LANES) {
+                let position = [V::load(&columns.number[x..]), row];
+                let flow = [V::load(&fields[FLOW][x..]), V::load(&fields[FLOW + 1][x..])];
+                let [mean, rate, seen] = sample_views(views, layout.frame, position, flow, V::constant(1.0));
+                mean.store(&mut means[x..]);
+                rate.store(&mut fields[RATE][x..]);
+                seen.store(&mut fields[SEEN][x..]);
             }
+            // Lanes beyond the tile have no data.
+            fields[SEEN][end + RIM..].fill(T::from_f64(0.0));
         }
         // The slopes give way to differences.
         let half = V::constant(0.5);
-        let down = self.layout.down();
         for y in RIM - 1..=RIM + height {
-            for x in (0..width + 2).step_by(V::LANES) {
+            let [here, below] = &mut fields[y..y + 2] else { unreachable!("two rows") };
+            for x in (LEFT - 1..=end).step_by(V::LANES) {
                 for k in 0..2 {
-                    let flow = self.layout.at(FLOW + k, y) - 1 + x;
-                    let here = self.load::<V>(flow);
-                    for (gap, step) in [(RIGHT, 1), (LOWER, down)] {
-                        let at = self.layout.at(gap + k, y) - 1 + x;
-                        let implied = (self.load::<V>(at) + self.load(at + step)) * half;
-                        self.store(at, self.load::<V>(flow + step) - here - implied);
-                    }
+                    let (flow, slope) = (V::load(&here[FLOW + k][x..]), V::load(&here[RIGHT + k][x..]));
+                    let implied = (slope + V::load(&here[RIGHT + k][x + 1..])) * half;
+                    (V::load(&here[FLOW + k][x + 1..]) - flow - implied).store(&mut here[RIGHT + k][x..]);
+                    let implied = (V::load(&here[LOWER + k][x..]) + V::load(&below[LOWER + k][x..])) * half;
+                    (V::load(&below[FLOW + k][x..]) - flow - implied).store(&mut here[LOWER + k][x..]);
                 }
             }
         }
         for y in 2..height + 2 * RIM - 2 {
-            for x in (0..width + 2 * RIM - 4).step_by(V::LANES) {
-                let at = |k: usize| self.layout.at(k, y) - RIM + 2 + x;
-                let places = [(MEAN, 1, X), (MEAN, down, Y), (RATE, 1, RATE_X), (RATE, down, RATE_Y)];
-                for (from, step, to) in places.map(|(from, step, to)| (at(from), step, at(to))) {
-                    self.store(to, self.slope::<V>(from, step));
+            let around = [y - 2, y - 1, y + 1, y + 2];
+            for x in (LEFT - RIM + 2..end + RIM - 2).step_by(V::LANES) {
+                let means = &weights[y][MEAN];
+                let mean_x = slope::<T, V>([-2, -1, 1, 2].map(|step| &means[x.wrapping_add_signed(step)..]));
+                let mean_y = slope::<T, V>(around.map(|y| &weights[y][MEAN][x..]));
+                let rates = &fields[y][RATE];
+                let rate_x = slope::<T, V>([-2, -1, 1, 2].map(|step| &rates[x.wrapping_add_signed(step)..]));
+                let rate_y = slope::<T, V>(around.map(|y| &fields[y][RATE][x..]));
+                for (k, value) in [(X, mean_x), (Y, mean_y), (RATE_X, rate_x), (RATE_Y, rate_y)] {
+                    value.store(&mut fields[y][k][x..]);
                 }
             }
         }
-        for y in self.layout.inner() {
-            for x in (0..width).step_by(V::LANES) {
-                let at = |k: usize| self.layout.at(k, y) + x;
-                let places = [(at(X), 1, at(XX)), (at(X), down, at(XY)), (at(Y), down, at(YY))];
-                for (from, step, to) in places {
-                    self.store(to, self.slope::<V>(from, step));
+        for y in layout.inner() {
+            let around = [y - 2, y - 1, y + 1, y + 2];
+            for x in (LEFT..end).step_by(V::LANES) {
+                let slopes = &fields[y][X];
+                let xx = slope::<T, V>([-2, -1, 1, 2].map(|step| &slopes[x.wrapping_add_signed(step)..]));
+                let xy = slope::<T, V>(around.map(|y| &fields[y][X][x..]));
+                let yy = slope::<T, V>(around.map(|y| &fields[y][Y][x..]));
+                for (k, value) in [(XX, xx), (XY, xy), (YY, yy)] {
+                    value.store(&mut fields[y][k][x..]);
                 }
             }
         }
@@ -116,85 +123,67 @@ impl<T: SimdReal> Tile<T> {
     fn read(&mut self, start: &Planes<T>, y: usize) {
         let row = self.layout.row(y);
         let (first, last) = (self.layout.origin.0 as isize - RIM as isize, self.layout.frame.0 as isize - 1);
-        for k in 0..6 {
-            let (line, to) = (start.line(k, row), self.layout.at(k, y) - RIM);
-            let count = self.layout.size.0 + 2 * RIM;
-            let before = (-first).max(0) as usize;
-            let whole = (last + 1 - first.max(0)).min((count - before) as isize) as usize;
-            let from = first.max(0) as usize;
-            self.data[to..to + before].fill(line[0]);
-            self.data[to + before..to + before + whole].copy_from_slice(&line[from..from + whole]);
-            self.data[to + before + whole..to + count].fill(line[line.len() - 1]);
+        let count = self.layout.size.0 + 2 * RIM;
+        let before = (-first).max(0) as usize;
+        let whole = (last + 1 - first.max(0)).min((count - before) as isize) as usize;
+        let from = first.max(0) as usize;
+        for (k, to) in self.fields[y][..6].iter_mut().enumerate() {
+            let (line, to) = (start.line(k, row), &mut to[LEFT - RIM..][..count]);
+            to[..before].fill(line[0]);
+            to[before..before + whole].copy_from_slice(&line[from..from + whole]);
+            to[before + whole..].fill(line[line.len() - 1]);
         }
-    }
-
-    /// Derivative at a sample, by differences over two samples `step` apart on either side.
-    #[inline(always)]
-    fn slope<V: Lanes<Scalar = T>>(&self, at: usize, step: usize) -> V {
-        let near = self.load::<V>(at + step) - self.load(at - step);
-        let far = self.load::<V>(at + 2 * step) - self.load(at - 2 * step);
-        near.mul_add(V::constant(8.0 / 12.0), far * V::constant(-1.0 / 12.0))
     }
 
     /// Writes the share of the increment that the residual earns.
     #[inline(always)]
-    fn finish<V: Lanes<Scalar = T>>(
-        &mut self,
-        views: &[View<'_, T>],
-        (columns, rows): (&Range<usize>, &Range<usize>),
-        out: &mut [T],
-    ) {
-        let (width, _) = self.layout.size;
-        for y in self.layout.inner() {
-            let row = V::constant(self.layout.row(y) as f64);
-            for k in [BEFORE, AFTER] {
-                let at = self.layout.at(k, y) - LEFT;
-                self.data[at..at + self.layout.stride].fill(T::from_f64(0.0));
-            }
-            for x in (0..width).step_by(V::LANES) {
-                let at = |k: usize| self.layout.at(k, y) + x;
-                let column = V::load(&self.columns.number[RIM + x..]);
-                let u = self.load::<V>(at(FLOW)) + self.load(at(D));
-                let v = self.load::<V>(at(FLOW + 1)) + self.load(at(D + 1));
-                let inside = V::load(&self.columns.even[x..]) + V::load(&self.columns.odd[x..]);
-                let seen = self.load::<V>(at(SEEN)) * inside;
-                let [_, rate, seen] = sample_views(views, self.layout.frame, [column, row], [u, v], seen);
-                let counts = V::zero().lt(seen);
-                let places = [at(BEFORE), at(AFTER)];
-                for (place, rate) in places.into_iter().zip([self.load::<V>(at(RATE)), rate]) {
-                    self.store(place, V::select(counts, rate.max(-rate), V::zero()));
+    fn finish<V: Lanes<Scalar = T>>(&mut self, columns: &Range<usize>, rows: &Range<usize>, out: &mut [T]) {
+        let Tile { layout, columns: Columns { even, odd, .. }, fields, system, weights, increment: [increment, _] } =
+            self;
+        let (height, end) = (layout.size.1, LEFT + layout.size.0);
+        for y in layout.inner() {
+            let (fields, increment, out) = (&fields[y], &increment[y], &mut system[y]);
+            for x in (LEFT..end).step_by(V::LANES) {
+                let at = |k: usize| V::load(&fields[k][x..]);
+                let counts = V::zero().lt(at(SEEN) * (V::load(&even[x..]) + V::load(&odd[x..])));
+                let (du, dv) = (V::load(&increment[0][x..]), V::load(&increment[1][x..]));
+                let before = at(RATE);
+                let after = at(X).mul_add(du, at(Y).mul_add(dv, before));
+                for (k, rate) in [(BEFORE, before), (AFTER, after)] {
+                    V::select(counts, rate.max(-rate), V::zero()).store(&mut out[k][x..]);
                 }
             }
         }
         let taps: [T; MEAN_REACH + 1] =
             std::array::from_fn(|k| T::from_f64((-0.5 * (k as f64 / MEAN_SIGMA).powi(2)).exp()));
         let stride = out.len() / rows.len();
-        let (first, top) = (columns.start - self.layout.origin.0, rows.start - self.layout.origin.1 + RIM);
+        let (first, top) = (columns.start - layout.origin.0, rows.start - layout.origin.1 + RIM);
         for y in top..top + rows.len() {
-            for x in (0..width).step_by(V::LANES) {
+            let means = &mut weights[y];
+            let near = y.saturating_sub(MEAN_REACH).max(RIM)..(y + MEAN_REACH + 1).min(RIM + height);
+            for x in (LEFT..end).step_by(V::LANES) {
                 let mut sums = [V::zero(); 2];
-                for n in y.saturating_sub(MEAN_REACH).max(RIM)..(y + MEAN_REACH + 1).min(RIM + self.layout.size.1) {
+                for n in near.clone() {
                     let weight = V::splat(taps[n.abs_diff(y)]);
                     for (sum, k) in sums.iter_mut().zip([BEFORE, AFTER]) {
-                        *sum = self.load::<V>(self.layout.at(k, n) + x).mul_add(weight, *sum);
+                        *sum = V::load(&system[n][k][x..]).mul_add(weight, *sum);
                     }
                 }
-                for (k, sum) in [BEFORE_DOWN, AFTER_DOWN].into_iter().zip(sums) {
-                    let to = self.layout.at(k, y) + x;
-                    self.store(to, sum);
-                }
+                sums[0].store(&mut means[BEFORE_DOWN][x..]);
+                sums[1].store(&mut means[AFTER_DOWN][x..]);
             }
-            for k in [BEFORE_DOWN, AFTER_DOWN] {
-                let at = self.layout.at(k, y);
-                self.data[at - LEFT..at].fill(T::from_f64(0.0));
-                self.data[at + width..at - LEFT + self.layout.stride].fill(T::from_f64(0.0));
+            for line in means.iter_mut() {
+                line[..LEFT].fill(T::from_f64(0.0));
+                line[end..].fill(T::from_f64(0.0));
             }
             for x in (0..columns.len()).step_by(V::LANES) {
+                let at = LEFT + first + x;
                 let mut sums = [V::zero(); 2];
                 for (sum, k) in sums.iter_mut().zip([BEFORE_DOWN, AFTER_DOWN]) {
-                    let at = self.layout.at(k, y) + first + x;
-                    for (n, &weight) in taps.iter().enumerate() {
-                        let pair = if n == 0 { self.load::<V>(at) } else { self.load::<V>(at - n) + self.load(at + n) };
+                    let line = &means[k];
+                    *sum = V::load(&line[at..]) * V::splat(taps[0]);
+                    for (n, &weight) in taps.iter().enumerate().skip(1) {
+                        let pair = V::load(&line[at - n..]) + V::load(&line[at + n..]);
                         *sum = pair.mul_add(V::splat(weight), *sum);
                     }
                 }
@@ -203,9 +192,17 @@ impl<T: SimdReal> Tile<T> {
                 let share = (fall * V::constant(1.0 / WHOLE_FALL)).max(V::zero()).min(V::constant(1.0));
                 for k in 0..2 {
                     let to = (y - top) * stride + k * (stride / 2) + LEFT + columns.start + x;
-                    (self.load::<V>(self.layout.at(D + k, y) + first + x) * share).store(&mut out[to..]);
+                    (V::load(&increment[y][k][at..]) * share).store(&mut out[to..]);
                 }
             }
         }
     }
+}
+
+/// Derivative by differences over two samples on either side; `around`: from two before to two after.
+#[inline(always)]
+fn slope<T: SimdReal, V: Lanes<Scalar = T>>(around: [&[T]; 4]) -> V {
+    let [before, left, right, after] = around;
+    let (near, far) = (V::load(right) - V::load(left), V::load(after) - V::load(before));
+    near.mul_add(V::constant(8.0 / 12.0), far * V::constant(-1.0 / 12.0))
 }
