@@ -16,9 +16,10 @@
 //! Jacobian implies out of the difference `D`: affine motion costs nothing, and `d` is zero where the field
 //! is right.
 //!
-//! A pixel takes the share of `d` that the fall of the mean of `|r|` around it earns: noise, which windows
-//! average better, lets it fall by chance, but little. The Jacobian stays that of the windows; the covariance
-//! of the flow gains the outer product of what the pixel moves by, since two estimates differ by it.
+//! A pixel takes the share of `d` that the fall of the mean linearised residual of brightness around it, in
+//! grey levels, earns: noise, which windows average better, lets it fall by chance, but little. The Jacobian
+//! stays that of the windows; the covariance of the flow gains the outer product of what the pixel moves by,
+//! since two estimates differ by it.
 
 mod increment;
 mod layout;
