@@ -38,9 +38,9 @@ VARIANTS: dict[str, list[str]] = {
 ESTIMATE = """
 import time, jacoflow
 frames = jacoflow.scenes.Scene("vortex", width=320, height=240, random_state=1).frames(3)
-jacoflow.estimate(frames, threads=1)
+jacoflow.flow(*frames, threads=1)
 start = time.process_time()
-jacoflow.estimate(frames, threads=1)
+jacoflow.flow(*frames, threads=1)
 print(time.process_time() - start)
 """
 MEASURED = "BENCHMARK_BUILD_SECONDS"

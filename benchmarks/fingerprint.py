@@ -72,20 +72,20 @@ def fields() -> Named:
         yield (
             f"field {preset} vortex",
             field_parts(
-                jacoflow.estimate(vortex[:3], method=jacoflow.CoarseToFine(preset=preset), threads=1)
+                jacoflow.estimate(vortex[:3], ends="drop", method=jacoflow.CoarseToFine(preset=preset), threads=1)
             ),
         )
         yield (
             f"field {preset} shifted pair",
             field_parts(
-                jacoflow.estimate(list(shifted[:2]), method=jacoflow.CoarseToFine(preset=preset), threads=1)
+                jacoflow.flow(*shifted[:2], method=jacoflow.CoarseToFine(preset=preset), threads=1)
             ),
         )
-    yield "field balanced float64", field_parts(jacoflow.estimate(disc.astype(float), threads=1))
+    yield "field balanced float64", field_parts(jacoflow.estimate(disc.astype(float), ends="drop", threads=1))
     for method in ("windowed", "instantaneous", "lucas_kanade", "horn_schunck"):
-        yield f"field {method}", field_parts(jacoflow.estimate(vortex[:3], method=method, threads=1))
-    yield "field recursive", field_parts(jacoflow.estimate(vortex, temporal="recursive", threads=1))
-    field = jacoflow.estimate(disc, fps=25.0, threads=1)[0]
+        yield f"field {method}", field_parts(jacoflow.estimate(vortex[:3], ends="drop", method=method, threads=1))
+    yield "field recursive", field_parts(jacoflow.estimate(vortex, ends="drop", temporal="recursive", threads=1))
+    field = jacoflow.estimate(disc, fps=25.0, threads=1)[1]
     yield (
         "derived",
         [field.value(name) for name in jacoflow.quantities()] + [field.std("curl"), field.std("divergence")],

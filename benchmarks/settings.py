@@ -34,7 +34,7 @@ class Setting:
 
     def field(self, frames: Sequence[NDArray[Any]], **more: Any) -> jacoflow.FlowField:
         """The estimate from two or three frames."""
-        return jacoflow.estimate(frames, **{**self.options, **more})
+        return jacoflow.flow(*frames, **{**self.options, **more})
 
     def plain_windows(self, frames: Sequence[NDArray[Any]]) -> float | Array:
         """Its window, or those it chose for the slopes, (H, W), px: the plain Gaussian ones as noisy as

@@ -19,7 +19,7 @@ TARGET = Path(__file__).resolve().parent / "images" / "overview.png"
 def main() -> None:
     scene = jacoflow.scenes.Scene("vortex", width=200, height=150, core=30, circulation=200)
     frames = scene.frames(3)
-    field = jacoflow.estimate(frames)[0]
+    field = jacoflow.flow(*frames)
     figure, axes = pyplot.subplots(1, 4, figsize=(14, 3.1), layout="constrained")
     plot.quiver(field, frame=frames[1], axes=axes[0])
     plot.flow_colour(field, axes=axes[1], max_speed=0.8)

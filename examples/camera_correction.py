@@ -72,7 +72,7 @@ def resample(image: np.ndarray, matrix: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     _, frames = shake()
-    fields = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))
+    fields = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0), ends="drop")
     motions = np.array([camera_motion(fields[k]) for k in range(COUNT - 2)])
     names = ("pan x, px/frame", "pan y, px/frame", "zoom, 1/frame", "roll, rad/frame")
     truth = (PAN[0], PAN[1], ZOOM, ROLL)

@@ -73,7 +73,7 @@ def largest_patch(mask: np.ndarray) -> np.ndarray | None:
 
 def main() -> None:
     frames = watch()
-    fields = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=3.0))
+    fields = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=3.0), ends="drop")
     false_alarms = detected = 0
     errors, last = [], None
     print("frame  significant px  alarm")

@@ -43,10 +43,10 @@ class Thing:
         dx, dy = x - self.centre[0] - self.velocity[0] * t, y - self.centre[1] - self.velocity[1] * t
         return (np.abs(dx) <= self.half_width * grow) & (np.abs(dy) <= self.half_height * grow)
 
-    def inside(self, margin: float) -> tuple[slice, slice]:
-        """The box at time 0 without a margin, where windows see nothing else."""
-        (x, y), w, h = self.centre, self.half_width - margin, self.half_height - margin
-        return slice(round(y - h), round(y + h) + 1), slice(round(x - w), round(x + w) + 1)
+    def region(self) -> tuple[int, int, int, int]:
+        """The box at time 0, (x, y, width, height)."""
+        (x, y), w, h = self.centre, self.half_width, self.half_height
+        return round(x - w), round(y - h), 2 * w + 1, 2 * h + 1
 
 
 THINGS = (
@@ -71,25 +71,19 @@ def look(t: float) -> np.ndarray:
 
 def main() -> None:
     frames = [look(t) for t in (-1.0, 0.0, 1.0)]
-    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0), fps=FPS)
-    # With the frame rate known, rates come per second.
-    divergence, spread = np.asarray(field.divergence), np.asarray(field.std("divergence"))
+    field = jacoflow.flow(*frames, method=jacoflow.Windowed(window_sigma=4.0), fps=FPS)
+    # With the frame rate known, times are in seconds.
     print(f"{'what':24} {'divergence (truth)':>20} {'time to contact':>22} {'across, px/frame':>16}   verdict")
     for thing in THINGS:
-        box = thing.inside(margin=12)
-        weight = 1.0 / spread[box] ** 2
-        mean = float(np.nansum(weight * divergence[box]) / np.nansum(weight))
-        # Windows overlap: about one independent value for each window area.
-        independent = max(1.0, weight.size / (4 * np.pi * 4.0**2))
-        error = float(np.sqrt(weight.size / np.nansum(weight) / independent))
-        u, v = (float(np.nanmedian(field.flow[box][..., k])) for k in (0, 1))
+        divergence, contact_time = (field.measure(name, thing.region()) for name in ("divergence", "time_to_contact"))
+        mean, error = divergence.value, divergence.std
+        u, v = (field.measure(name, thing.region()).value / FPS for name in ("u", "v"))
         truth = 0.0 if thing.contact is None else 2.0 / thing.contact * FPS
         if abs(mean) < 5 * error or abs(mean) < 0.25:
             verdict, contact = "keeps its distance", f"{'-':>22}"
         else:
-            seconds, seconds_std = 2.0 / mean, 2.0 / mean**2 * error
             verdict = "comes nearer" if mean > 0 else "draws away"
-            contact = f"{seconds:8.2f} s +- {seconds_std:.2f} s".rjust(22)
+            contact = f"{contact_time.value:8.2f} s +- {contact_time.std:.2f} s".rjust(22)
         print(f"{thing.name:24} {mean:+.3f} ({truth:+.3f}) 1/s  {contact} ({u:+.2f}, {v:+.2f})   {verdict}")
         check(f"divergence of the {thing.name}", mean, truth, 0.12)
         check(f"speed of the {thing.name}", u, thing.velocity[0], 0.1)
@@ -107,18 +101,9 @@ def main() -> None:
 
 
 def where_it_heads(field: jacoflow.FlowField) -> tuple[float, float]:
-    """The point at rest of the background, from a least-squares fit of u = r (x - x0), v = r (y - y0) away from the things."""
-    y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
-    background = np.asarray(field.valid).copy()
-    for thing in THINGS:
-        rows, columns = thing.inside(margin=-14)
-        background[max(rows.start, 0) : rows.stop, max(columns.start, 0) : columns.stop] = False
-    x, y, (u, v) = x[background], y[background], field.flow[background].T
-    # Unknowns r, r x0, r y0.
-    ones, zeros = np.ones_like(u), np.zeros_like(u)
-    rows = np.concatenate([np.stack([x, -ones, zeros], axis=1), np.stack([y, zeros, -ones], axis=1)])
-    rate, rate_x, rate_y = np.linalg.lstsq(rows, np.concatenate([u, v]), rcond=None)[0]
-    return float(rate_x / rate), float(rate_y / rate)
+    """The point at rest of the background, which most of the picture follows."""
+    x, y = (field.measure(f"rotation_centre_{axis}").value for axis in "xy")
+    return x, y
 
 
 if __name__ == "__main__":

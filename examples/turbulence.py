@@ -36,7 +36,7 @@ def main() -> None:
     camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, random_state=1)
     frames = [camera.apply_u8(scene.frame(t), index=k) for k, t in enumerate((-1.0, 0.0, 1.0))]
     # A narrow window for the short waves, and less smoothing than usual: smoothing takes away strain of a fine tracer.
-    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=2.5), preprocess=jacoflow.Preprocess(smooth=1.0))
+    field = jacoflow.flow(*frames, method=jacoflow.Windowed(window_sigma=2.5), preprocess=jacoflow.Preprocess(smooth=1.0))
     truth = scene.truth(0.0)
     inside = np.zeros((HEIGHT, WIDTH), dtype=bool)
     inside[16:-16, 16:-16] = True

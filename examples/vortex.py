@@ -37,7 +37,7 @@ def main() -> None:
     )
     camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, random_state=1)
     frames = np.array([camera.apply_u8(frame, index=k) for k, frame in enumerate(scene.frames(5))])
-    fields = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=6.0))
+    fields = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=6.0), ends="drop")
     rows = []
     for k in range(len(frames) - 2):
         curl = np.asarray(fields[k].curl, dtype=float)

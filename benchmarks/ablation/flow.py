@@ -33,27 +33,27 @@ def rows() -> dict[str, list[float]]:
         found["changed"].append(error(scenes.changed_pair(seed, (3.3, -1.4), change), (3.3, -1.4)))
     for seed in SPECKED:
         clean, spoilt, far = scenes.specks(seed)
-        one, other = jacoflow.estimate(clean, threads=1), jacoflow.estimate(spoilt, threads=1)
+        one, other = jacoflow.flow(*clean, threads=1), jacoflow.flow(*spoilt, threads=1)
         found["specks"].append(float(np.mean((np.abs(other.u - one.u) / one.std("u"))[far])))
     for seed in SEEDS:
         frames, flow, near = scenes.layered(seed)
-        field = jacoflow.estimate(frames, threads=1)
+        field = jacoflow.flow(*frames, threads=1)
         distance = np.linalg.norm(field.flow - flow, axis=-1)[near]
         std = np.hypot(field.std("u"), field.std("v"))[near]
         is_silent = (distance > 5 * std) & (field.status[near] == jacoflow.Status.OK)
         found["silent"].append(float(is_silent[distance > 1].mean()))
         found["boundary"].append(float(distance.mean()))
         three, flow, near = scenes.layered(seed, 3)
-        field = jacoflow.estimate(three, covariance=False, threads=1)
+        field = jacoflow.flow(*three, covariance=False, threads=1)
         found["three frames"].append(float(np.linalg.norm(field.flow - flow, axis=-1)[near].mean()))
     for move, seed in itertools.product(FRACTIONS, SEEDS):
-        field = jacoflow.estimate(scenes.undersampled(seed, move), threads=1)
+        field = jacoflow.flow(*scenes.undersampled(seed, move), threads=1)
         off = np.abs(scenes.inner(field.flow - np.array(move)))
         std = scenes.inner(np.stack([field.std("u"), field.std("v")], axis=-1))
         found["undersampled"].append(float(np.sqrt(np.mean(off**2))))
         found["outside"].append(float(np.mean(off > 1.96 * std)))
     for shift, seed in itertools.product(SHIFTS, SEEDS):
-        field = jacoflow.estimate(scenes.shifted_speckle(seed, shift), covariance=False, threads=1)
+        field = jacoflow.flow(*scenes.shifted_speckle(seed, shift), covariance=False, threads=1)
         distance = np.linalg.norm(field.flow - np.array(shift), axis=-1)
         found["shifts"].append(float(np.median(distance[scenes.FOUND])))
     return found
@@ -61,5 +61,5 @@ def rows() -> dict[str, list[float]]:
 
 def error(frames: list[scenes.Array], move: tuple[float, float]) -> float:
     """Root-mean-square error of the flow, px."""
-    flow = jacoflow.estimate(frames, covariance=False, threads=1).flow
+    flow = jacoflow.flow(*frames, covariance=False, threads=1).flow
     return float(np.sqrt(np.mean(np.sum(scenes.inner(flow - np.array(move)) ** 2, axis=-1))))

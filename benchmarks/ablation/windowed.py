@@ -36,7 +36,7 @@ def rows() -> dict[str, list[float]]:
     for family, noise, seed in itertools.product(slow, (0.5, 3.0), SEEDS):
         frames, truth = family.frames(SIZE, noise, seed, 3)
         begun = time.process_time()
-        field = jacoflow.estimate(frames, method="windowed", threads=1)
+        field = jacoflow.flow(*frames, method="windowed", threads=1)
         found["ms"].append(1e3 * (time.process_time() - begun))
         inner = np.zeros(field.shape, bool)
         inner[MARGIN:-MARGIN, MARGIN:-MARGIN] = True
@@ -59,7 +59,7 @@ def controlled_scenes() -> Iterator[float]:
         case = controlled.Case(wavelength, speed, noise, seed)
         frames = [controlled.frame(case, t) for t in (-1.0, 0.0, 1.0)]
         flow, jacobian = controlled.truth(wavelength, speed, seed, 0.0, (-1.0, 1.0))
-        field = jacoflow.estimate(frames, method=jacoflow.Windowed(rows="brightness"), threads=1)
+        field = jacoflow.flow(*frames, method=jacoflow.Windowed(rows="brightness"), threads=1)
         inner = np.zeros(field.shape, bool)
         inner[MARGIN:-MARGIN, MARGIN:-MARGIN] = True
         yield excess(held(field, flow, jacobian, inner & field.valid))
@@ -71,6 +71,6 @@ def grating(noise: float, seed: int) -> float:
     camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=seed)
     lines = [np.tile(100 + 50 * np.sin((x - 0.3 * t) / 4), (56, 1)) for t in (-1, 0, 1)]
     frames = [camera.apply_u8(frame, index=k) for k, frame in enumerate(lines)]
-    field = jacoflow.estimate(frames, method="windowed", threads=1)
+    field = jacoflow.flow(*frames, method="windowed", threads=1)
     v, std = field.v[field.valid], field.std("v")[field.valid]
     return float(np.mean([np.abs(v - along) > 1.96 * std for along in ALONG]))

@@ -33,7 +33,7 @@ def frames(folder: Path) -> list[NDArray[np.uint8]]:
 
 def field(first: Array, second: Array, preset: str) -> jacoflow.FlowField:
     """Coarse-to-fine flow of a pair."""
-    return jacoflow.estimate([first, second], method=jacoflow.CoarseToFine(preset=preset))
+    return jacoflow.flow(first, second, method=jacoflow.CoarseToFine(preset=preset))
 
 
 def drive(data: Path) -> tuple[list[NDArray[np.uint8]], Array]:

@@ -34,7 +34,7 @@ ASKED = (0.92, 0.97)
 def estimate(frames: list[Any], preset: str) -> jacoflow.FlowField:
     """The estimate whose intervals are looked at."""
     method = jacoflow.CoarseToFine(preset=preset, time_scheme="pair" if len(frames) == 2 else None)
-    return jacoflow.estimate(frames, method=method)
+    return jacoflow.flow(*frames, method=method)
 
 
 def held(

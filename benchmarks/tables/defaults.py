@@ -43,7 +43,7 @@ def measure(
     camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=1)
     frames = [camera.apply_u8(scene.frame(t), index) for index, t in enumerate((-1.0, 0.0, 1.0))]
     method = jacoflow.Windowed(rows=options["rows"])
-    field = jacoflow.estimate(frames, method=method, preprocess=jacoflow.Preprocess(smooth=options["smooth"]))
+    field = jacoflow.flow(*frames, method=method, preprocess=jacoflow.Preprocess(smooth=options["smooth"]))
     truth = scene.truth(0.0)
     inner = np.zeros(field.shape, bool)
     inner[MARGIN:-MARGIN, MARGIN:-MARGIN] = True

@@ -28,7 +28,7 @@ SHIFTS = ((24, 0), (48, 0), (56, 0), (0, -64), (80, 0), (80, 60))
 def flows(frames: list[Array]) -> dict[str, Array]:
     """Ours by preset, and OpenCV's."""
     found = {
-        preset: jacoflow.estimate(frames, method=jacoflow.CoarseToFine(preset=preset), covariance=False).flow
+        preset: jacoflow.flow(*frames, method=jacoflow.CoarseToFine(preset=preset), covariance=False).flow
         for preset in PRESETS
     }
     eight_bit = [np.clip(np.rint(frame), 0, 255).astype(np.uint8) for frame in frames]
@@ -59,7 +59,7 @@ def specks(seeds: tuple[int, ...]) -> list[Row]:
         for seed in seeds:
             clean, spoilt, far = scenes.specks(seed)
             fields = [
-                jacoflow.estimate(frames, method=jacoflow.CoarseToFine(preset=preset)) for frames in (clean, spoilt)
+                jacoflow.flow(*frames, method=jacoflow.CoarseToFine(preset=preset)) for frames in (clean, spoilt)
             ]
             std = np.stack([fields[0].std("u"), fields[0].std("v")], axis=-1)
             changes.append((np.abs(fields[1].flow - fields[0].flow) / std)[far])

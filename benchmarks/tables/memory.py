@@ -78,9 +78,9 @@ def peak(file: str, preset: str, count: int, covariance: bool) -> list[float]:
     """Planes that the estimate from the last `count` frames of the file needs, in this process."""
     given = [np.ascontiguousarray(frame) for frame in np.load(file)[-count:]]
     chosen = method(preset, count)
-    jacoflow.estimate([frame[:WARM_UP, :WARM_UP] for frame in given], method=chosen, covariance=covariance)
+    jacoflow.flow(*[frame[:WARM_UP, :WARM_UP] for frame in given], method=chosen, covariance=covariance)
     before = highest()
-    jacoflow.estimate(given, method=chosen, covariance=covariance)
+    jacoflow.flow(*given, method=chosen, covariance=covariance)
     return [(highest() - before) / (4.0 * given[0].size)]
 
 
@@ -97,7 +97,7 @@ def calls(file: str, preset: str, count: int, covariance: bool) -> list[float]:
     given = [np.ascontiguousarray(frame) for frame in np.load(file)[-count:]]
     chosen = method(preset, count)
     return counted(
-        lambda frames: jacoflow.estimate(frames, method=chosen, covariance=covariance),
+        lambda frames: jacoflow.flow(*frames, method=chosen, covariance=covariance),
         [given] * (BEFORE + COUNTED),
     )
 

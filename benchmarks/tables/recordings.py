@@ -133,7 +133,7 @@ def uncertainty(data: Path, presets: tuple[str, ...] = ("balanced", "fast", "acc
         for count in (2, 3) if preset == "balanced" and len(sample.frames) > 2 else (2,):
             frames = sample.pair() if count == 2 else sample.frames
             method = jacoflow.CoarseToFine(preset=preset, time_scheme="pair" if count == 2 else None)
-            found_field = jacoflow.estimate(frames, method=method)
+            found_field = jacoflow.flow(*frames, method=method)
             shares = intervals(found_field, sample.truth, sample.truth_std)
             rows.append({"sample": sample.name, "preset": preset, "frames": count, **shares})
     return rows + [{"sample": line, "preset": "skipped"} for line in missing]

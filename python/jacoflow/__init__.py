@@ -7,7 +7,7 @@ Frames are arrays (H, W), indexed [row, column] = [y, x]; x right, y down. Flow 
 >>> frames = jacoflow.scenes.Scene("affine", width=96, height=64).frames(3)
 >>> field = jacoflow.estimate(frames)
 >>> field.shape
-(1, 64, 96)
+(3, 64, 96)
 """
 
 from importlib import import_module as _import_module
@@ -21,12 +21,14 @@ from ._jacoflow import (
     FlowFilter,
     FormatError,
     JacoflowError,
+    Measurement,
     MissingDependencyError,
     NotObservableError,
     NumericalError,
     __version__,
     corners,
     estimate,
+    flow,
     luminance,
     point_flow,
     quantise,
@@ -59,6 +61,7 @@ __all__ = [
     "Instantaneous",
     "JacoflowError",
     "LucasKanade",
+    "Measurement",
     "MissingDependencyError",
     "NotObservableError",
     "NumericalError",
@@ -74,6 +77,7 @@ __all__ = [
     "corners",
     "estimate",
     "filters",
+    "flow",
     "io",
     "luminance",
     "mixture",

@@ -19,8 +19,10 @@ __all__ = [
     "NumericalError",
     "FlowEstimator",
     "estimate",
+    "flow",
     "_restore_estimator",
     "FlowField",
+    "Measurement",
     "quantities",
     "_restore_field",
     "_status_names",
@@ -260,7 +262,7 @@ class FlowField:
         self,
         /,
         name: str,
-        region: _Rectangle | None = None,
+        region: ArrayLike | None = None,
         aggregate: Literal["inverse_variance", "median"] | None = None,
     ) -> tuple[float, float, int]:
         """One number for a region: (value, standard deviation, number of sites) of the parameter or derived
@@ -271,6 +273,10 @@ class FlowField:
         estimates, and for an error that they have in common: what they claim and do not scatter. A single
         field only. ValueError for unknown names and for "inverse_variance" without covariance.
         """
+    def measure(
+        self, /, name: str, region: ArrayLike | None = None, *, seed: tuple[float, float] | None = None
+    ) -> Measurement:
+        """The"""
     @overload
     def advect(self, /, points: ArrayLike, covariance: None = None) -> NDArray[np.float64]:
         """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its
@@ -326,6 +332,12 @@ class FlowField:
     def pixel_pitch(self) -> tuple[float, float]:
         """Physical size (dx, dy) of a pixel, 1 px or any length unit."""
     @property
+    def length_unit(self) -> str:
+        """Name"""
+    @property
+    def interval(self) -> Literal["forward", "central", "instant"]:
+        """What"""
+    @property
     def correlation_length(self) -> float:
         """How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0
         where they are independent or it is not known.
@@ -367,9 +379,47 @@ class FlowField:
     def __getitem__(self, index: int | slice, /) -> FlowField: ...
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
+@final
+class Measurement:
+    """A"""
+    @property
+    def quantity(self) -> str:
+        """N"""
+    @property
+    def unit(self) -> str:
+        """U"""
+    @property
+    def value(self) -> Any:
+        """V"""
+    @property
+    def std(self) -> Any:
+        """V"""
+    @property
+    def share(self) -> Any:
+        """V"""
+    @property
+    def valid_share(self) -> Any:
+        """V"""
+    @property
+    def count(self) -> Any:
+        """V"""
+    @property
+    def status(self) -> Any:
+        """V"""
+    @property
+    def motion(self) -> NDArray[np.float64]:
+        """V"""
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """V"""
+    @property
+    def centre(self) -> NDArray[np.float64]:
+        """V"""
 def estimate(
     frames: _Frames,
-    *,
+    *more: Any,
+    ends: Literal["nan", "drop"] = "nan",
+    pairs: bool = False,
     method: FlowMethod | None = None,
     initial: FlowField | ArrayLike | None = None,
     temporal: Fusion | None = None,
@@ -381,6 +431,7 @@ def estimate(
     preprocess: Preprocess | None = None,
     fps: float | None = None,
     pixel_pitch: float | tuple[float, float] | None = None,
+    length_unit: str | None = None,
     precision: _Precision | None = None,
     threads: int | None = None,
     simd: _Simd | None = None,
@@ -447,6 +498,28 @@ def estimate(
         For another dtype.
     """
 
+def flow(
+    first: _Frame,
+    second: _Frame,
+    third: _Frame | None = None,
+    *,
+    method: FlowMethod | None = None,
+    initial: FlowField | ArrayLike | None = None,
+    temporal: Fusion | None = None,
+    covariance: bool | None = None,
+    noise: float | None = None,
+    diagnostics: bool = False,
+    grid: SamplingGrid | None = None,
+    mask: NDArray[np.bool_] | None = None,
+    preprocess: Preprocess | None = None,
+    fps: float | None = None,
+    pixel_pitch: float | tuple[float, float] | None = None,
+    length_unit: str | None = None,
+    precision: _Precision | None = None,
+    threads: int | None = None,
+    simd: _Simd | None = None,
+) -> FlowField:
+    """One"""
 @final
 class FlowEstimator:
     """Flow from a stream: frames are pushed one by one, memory stays bounded.
@@ -469,11 +542,12 @@ class FlowEstimator:
         preprocess: Preprocess | None = None,
         fps: float | None = None,
         pixel_pitch: float | tuple[float, float] | None = None,
+        length_unit: str | None = None,
         precision: _Precision | None = None,
         threads: int | None = None,
         simd: _Simd | None = None,
     ) -> FlowEstimator: ...
-    def push(self, /, frame: _Frame) -> FlowField | None:
+    def push(self, /, frame: _Frame, *, time: float | None = None) -> FlowField | None:
         """Takes the next frame (H, W), in any grey unit; returns a FlowField (px/frame) once enough frames have
         come, before that None.
 
@@ -512,6 +586,7 @@ class FlowFilter:
         preprocess: Preprocess | None = None,
         fps: float | None = None,
         pixel_pitch: float | tuple[float, float] | None = None,
+        length_unit: str | None = None,
         precision: _Precision | None = None,
         threads: int | None = None,
         simd: _Simd | None = None,

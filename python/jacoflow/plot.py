@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._figures import axes_or_new, colour_map, frame_extent, pyplot_or_error
+from ._jacoflow import FlowField
 from ._stereo_plot import clusters, disparity, track_graph
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def flow_image(field: FieldLike, *, max_speed: float | None = None) -> NDArray[n
     """Colours of a flow, uint8 array (H, W, 3): direction is hue (right red, down yellow), speed is
     saturation, at rest is white, unknown is black.
 
-    `max_speed` (px/frame) is the speed of full saturation, by default the 99th percentile; faster is darker.
+    `max_speed` (px/frame, or the field's unit) is the speed of full saturation, by default the 99th percentile; faster is darker.
     """
     flow = _flow(field)
     return _colours(flow[..., 0], flow[..., 1], _full_speed(flow, max_speed))
@@ -75,7 +76,7 @@ def wheel_image(size: int = 96) -> NDArray[np.uint8]:
 
 
 def flow_colour(field: FieldLike, *, axes: Axes | None = None, max_speed: float | None = None, legend: bool = True) -> Axes:
-    """Draws `flow_image` of a flow (H, W, 2) in px/frame; `legend` adds the colour wheel with its full speed
+    """Draws `flow_image` of a flow (H, W, 2), px/frame or the field's unit; `legend` adds the colour wheel with its full speed
     in the lower right corner."""
     axes = axes_or_new(axes)
     image = flow_image(field, max_speed=max_speed)
@@ -86,7 +87,7 @@ def flow_colour(field: FieldLike, *, axes: Axes | None = None, max_speed: float 
         inset = axes.inset_axes((0.84, 0.02, 0.14, 0.14))
         inset.imshow(wheel_image())
         inset.set_axis_off()
-        inset.set_title(f"{speed:.3g} px/frame", fontsize="x-small", pad=2)
+        inset.set_title(f"{speed:.3g} {_unit(field, 'u', 'px/frame')}", fontsize="x-small", pad=2)
     return axes
 
 
@@ -166,24 +167,26 @@ def scalar_map(
 
 
 def divergence(field: FieldLike, *, axes: Axes | None = None, limit: float | None = None) -> Axes:
-    """Draws u_x + v_y of a field (H, W), 1/frame: red where the picture expands. `limit` as in
-    `scalar_map`."""
+    """Draws the divergence of a field (H, W), in its unit, else u_x + v_y, 1/frame: red where the picture
+    expands. `limit` as in `scalar_map`."""
     jacobian = _jacobian(field)
-    values = jacobian[..., 0, 0] + jacobian[..., 1, 1]
-    return scalar_map(values, axes=axes, field=field, limit=limit, label="divergence", unit="1/frame")
+    values = getattr(field, "divergence", jacobian[..., 0, 0] + jacobian[..., 1, 1])
+    unit = _unit(field, "divergence", "1/frame")
+    return scalar_map(values, axes=axes, field=field, limit=limit, label="divergence", unit=unit)
 
 
 def curl(field: FieldLike, *, axes: Axes | None = None, limit: float | None = None) -> Axes:
-    """Draws v_x - u_y of a field (H, W), 1/frame: red where the picture turns clockwise on the screen.
-    `limit` as in `scalar_map`."""
+    """Draws the curl of a field (H, W), in its unit, else v_x - u_y, 1/frame: red where the picture turns
+    clockwise on the screen. `limit` as in `scalar_map`."""
     jacobian = _jacobian(field)
-    values = jacobian[..., 1, 0] - jacobian[..., 0, 1]
-    return scalar_map(values, axes=axes, field=field, limit=limit, label="curl", unit="1/frame")
+    values = getattr(field, "curl", jacobian[..., 1, 0] - jacobian[..., 0, 1])
+    unit = _unit(field, "curl", "1/frame")
+    return scalar_map(values, axes=axes, field=field, limit=limit, label="curl", unit=unit)
 
 
 def overview(field: FieldLike, *, frame: NDArray[Any] | None = None, figure: Figure | None = None) -> Figure:
     """Four panels of a field (H, W): colours, arrows over `frame` (grey array (H, W), optional), divergence
-    and curl (1/frame). Returns the figure."""
+    and curl, in the field's units. Returns the figure."""
     if figure is None:
         pyplot = pyplot_or_error()
         figure = pyplot.figure(figsize=(11, 8), layout="constrained")
@@ -193,6 +196,11 @@ def overview(field: FieldLike, *, frame: NDArray[Any] | None = None, figure: Fig
     divergence(field, axes=panels[1, 0])
     curl(field, axes=panels[1, 1])
     return figure
+
+
+def _unit(field: FieldLike, name: str, default: str) -> str:
+    """The unit of a parameter or quantity, where the field knows it."""
+    return field.unit(name) if isinstance(field, FlowField) else default
 
 
 def _flow(field: FieldLike) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ __all__ = ["Status"]
 class Status(IntEnum):
     """Status code of one estimate; `FlowField.status` is an array (..., H, W) of these. Codes carry no unit.
 
-    BORDER, NON_FINITE, MASKED and UNOBSERVABLE come with NaN values.
+    BORDER, NON_FINITE, MASKED, UNOBSERVABLE and MISSING_FRAME come with NaN values.
 
     >>> Status(3).name
     'MASKED'
@@ -35,3 +35,5 @@ class Status(IntEnum):
     """A full estimate that the frames contradict: along it brightness changes by far more than usual. What is
     seen is hidden in another frame (occlusion), has
     changed, or moves differently; the covariance does not know, and the pixel is not `valid`. Only "coarse_to_fine" reports it."""
+    MISSING_FRAME = 9
+    """The sequence has no frame before or after this one that the estimate needs."""

@@ -135,8 +135,6 @@ pub struct Frames<'py> {
     colour: ColourRule,
     /// Number of frames.
     pub count: usize,
-    /// An array (whose result keeps the time axis even for one field) rather than a list.
-    pub is_array: bool,
 }
 
 impl<'py> Frames<'py> {
@@ -146,12 +144,12 @@ impl<'py> Frames<'py> {
         let is_sequence =
             object.is_instance_of::<pyo3::types::PyList>() || object.is_instance_of::<pyo3::types::PyTuple>();
         if is_sequence {
-            return Ok(Self { count: object.len()?, object: object.clone(), colour, is_array: false });
+            return Ok(Self { count: object.len()?, object: object.clone(), colour });
         }
         if object.cast::<PyIterator>().is_ok() {
             let list = object.try_iter()?.collect::<PyResult<Vec<_>>>()?;
             let list = PyList::new(object.py(), list)?;
-            return Ok(Self { count: list.len(), object: list.into_any(), colour, is_array: false });
+            return Ok(Self { count: list.len(), object: list.into_any(), colour });
         }
         let array = as_array("frames", object)?;
         let shape = array.shape().to_vec();
@@ -167,9 +165,9 @@ impl<'py> Frames<'py> {
             [_, rows, 3 | 4] if rows > 4 => refuse(
                 ", which looks like one colour image; pass a list of frames, or a stack (T, H, W, 3) with colour=\"luminance\"",
             ),
-            [count, _, _] => Ok(Self { count, object: array.into_any(), colour, is_array: true }),
+            [count, _, _] => Ok(Self { count, object: array.into_any(), colour }),
             [count, _, _, 3 | 4] if colour == ColourRule::Luminance => {
-                Ok(Self { count, object: array.into_any(), colour, is_array: true })
+                Ok(Self { count, object: array.into_any(), colour })
             }
             [_, _, _, 3 | 4] => refuse("; for colour frames pass colour=\"luminance\""),
             _ => refuse(""),
@@ -184,18 +182,38 @@ impl<'py> Frames<'py> {
 
 /// `mask`: a boolean array `(H, W)`, true where pixels may be used.
 pub fn mask(object: &Bound<'_, PyAny>) -> Outcome<Mask> {
-    let array = as_array("mask", object)?;
+    boolean("mask", object)
+}
+
+/// A boolean array `(H, W)`.
+pub fn boolean(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<Mask> {
+    let array = as_array(argument, object)?;
     let [height, width] = array.shape()[..] else {
-        return Err(PyValueError::new_err(format!("mask: expected shape (H, W), got {:?}", array.shape())).into());
+        let got = shape_text(array.shape());
+        return Err(PyValueError::new_err(format!("{argument}: expected shape (H, W), got {got}")).into());
     };
     let Some(values) = elements::<bool>(&array) else {
         return Err(PyTypeError::new_err(format!(
-            "mask: expected a boolean array, true where pixels may be used, got {}",
+            "{argument}: expected a boolean array, true where pixels may be used, got {}",
             dtype_name(&array)
         ))
         .into());
     };
     Ok(Frame::new(width, height, values)?)
+}
+
+/// Whether `object` is an array of booleans.
+pub fn is_boolean(object: &Bound<'_, PyAny>) -> Outcome<bool> {
+    let Ok(array) = object.cast::<PyUntypedArray>() else { return Ok(false) };
+    Ok(array.dtype().getattr("kind")?.extract::<String>()? == "b")
+}
+
+/// A shape as Python writes it.
+pub fn shape_text(shape: &[usize]) -> String {
+    match shape {
+        [one] => format!("({one},)"),
+        _ => format!("({})", shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")),
+    }
 }
 
 /// An `(N, 2)` array of integers.

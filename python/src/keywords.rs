@@ -15,6 +15,7 @@ macro_rules! with_common {
             preprocess: Object as Object = None,
             fps: Option<f64> as Option<f64> = None,
             pixel_pitch: Object as Object = None,
+            length_unit: Option<String> as Option<String> = None,
             precision: Option<String> as Option<String> = None,
             threads: Option<Integer> as Option<Integer> = None,
             simd: Option<String> as Option<String> = None,

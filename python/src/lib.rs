@@ -28,6 +28,7 @@ mod points;
 mod progress;
 #[cfg(feature = "reference")]
 mod reference_track;
+mod region;
 mod scenes;
 mod segment;
 mod stereo;
@@ -45,14 +46,14 @@ mod _jacoflow {
     use super::ablation::heuristics;
     #[cfg(feature = "reference")]
     #[pymodule_export]
-    use super::reference_track::{flow, kernels, mean_flow, tracker};
+    use super::reference_track::{gradient_flow, kernels, mean_flow, tracker};
     #[pymodule_export]
     use super::{
         command::run_command_line,
         dirichlet_mixture::{mixture_dirichlet_densities, mixture_dirichlet_fit},
         errors::{FormatError, JacoflowError, MissingDependencyError, NotObservableError, NumericalError},
-        estimate::{FlowEstimator, estimate, restore_estimator},
-        field::{FlowField, quantities, restore_field, status_names},
+        estimate::{FlowEstimator, estimate, flow, restore_estimator},
+        field::{FlowField, Measurement, quantities, restore_field, status_names},
         filters::{
             ExtendedKalmanFilter, GaussianFilter, KalmanFilter, MerweScaledSigmaPoints, ParticleFilter,
             UnscentedKalmanFilter, resample, restore_extended, restore_kalman, restore_particle, restore_unscented,

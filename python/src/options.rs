@@ -7,7 +7,7 @@ use jacoflow::image::{GaussianSmoother, Preprocess, Quantiser};
 use jacoflow::jet::Neighbourhood;
 use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
-use jacoflow::types::{AnyFrame, Mask, Precision, Rect, Sample, SamplingGrid};
+use jacoflow::types::{AnyFrame, Mask, Precision, Rect, Sample, SamplingGrid, Units};
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
@@ -158,7 +158,7 @@ pub fn neighbourhood(value: &Bound<'_, PyAny>) -> Outcome<Neighbourhood> {
 }
 
 /// `fps`, as seconds between frames.
-pub fn frame_period(fps: Option<f64>) -> Outcome<Option<f64>> {
+fn frame_period(fps: Option<f64>) -> Outcome<Option<f64>> {
     match fps {
         Some(fps) if !(fps.is_finite() && fps > 0.0) => {
             Err(Error::argument("fps", "a positive number of frames per second", fps).into())
@@ -194,20 +194,23 @@ impl PreprocessOptions {
     }
 }
 
-/// `pixel_pitch`: one length for both axes or (dx, dy).
-pub fn pixel_pitch(py: Python<'_>, value: &Object) -> Outcome<Option<(f64, f64)>> {
-    let Some(value) = value else { return Ok(None) };
+/// `pixel_pitch`, one length for both axes or (dx, dy), `length_unit` and `fps`.
+pub fn units(py: Python<'_>, pitch: &Object, length: Option<&str>, fps: Option<f64>) -> Outcome<Units> {
+    let period = frame_period(fps)?;
+    let Some(value) = pitch else {
+        return match length {
+            None => Ok(Units::new((1.0, 1.0), None, period)),
+            Some(name) => {
+                Err(Error::argument("length_unit", "a pixel_pitch in that unit", format!("{name:?} alone")).into())
+            }
+        };
+    };
     let value = value.bind(py);
-    if let Ok(pair) = value.extract::<(f64, f64)>() {
-        return Ok(Some(pair));
-    }
-    match value.extract::<f64>() {
-        Ok(side) => Ok(Some((side, side))),
-        Err(_) => {
-            Err(PyTypeError::new_err(format!("pixel_pitch: expected a length or (dx, dy), got {}", value.get_type()))
-                .into())
-        }
-    }
+    let side = || value.extract::<f64>().map(|side| (side, side));
+    let pair = value.extract::<(f64, f64)>().or_else(|_| side()).map_err(|_| {
+        PyTypeError::new_err(format!("pixel_pitch: expected a length or (dx, dy), got {}", value.get_type()))
+    })?;
+    Ok(Units::new(pair, length, period))
 }
 
 /// `precision=None | "float32" | "float64"`.

@@ -94,7 +94,7 @@ pub fn kernels(py: Python<'_>, order: Integer) -> Outcome<Vec<Bound<'_, PyAny>>>
 /// Flow (H, W, 2) and where it is accepted, of `jacoflow.reference.local_flow`.
 #[pyfunction(name = "_local_flow")]
 #[pyo3(signature = (first, second, window, order, cond_max, min_sigma, step_max))]
-pub fn flow<'py>(
+pub fn gradient_flow<'py>(
     first: &Bound<'py, PyAny>,
     second: &Bound<'py, PyAny>,
     window: Integer,

@@ -16,7 +16,7 @@ use crate::pipeline::{
 };
 use crate::synth::{Scene, SceneOptions, Sensor, build, truth};
 use crate::temporal::{FlowStream, StreamPlan};
-use crate::types::{AnyFrame, FlowField};
+use crate::types::{AnyFrame, FlowField, Units};
 use clap::Args;
 use serde_json::json;
 use std::fs::DirEntry;
@@ -79,7 +79,7 @@ impl DemoCommand {
             covariance: true,
             threads,
             simd,
-            frame_period: Some(1.0 / RATE),
+            units: Units::new((1.0, 1.0), None, Some(1.0 / RATE)),
             ..EstimatorOptions::default()
         };
         let estimator = Estimator::new(Method::Windowed(options), common)?;
@@ -177,6 +177,7 @@ fn compare(scene: &dyn Scene, fields: &[FlowField<f32>]) -> Result<Errors> {
     const MARGIN: usize = 12;
     let mut sum = Errors::default();
     for field in fields {
+        let field = field.in_pixels_and_frames();
         let exact = truth(scene, field.layout.frame_index as f64)?;
         for site in 0..field.len() {
             let (x, y) = (site % field.width, site / field.width);

@@ -94,10 +94,6 @@ impl EgomotionCommand {
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let plan = self.plan()?;
         let opened = open_input(&self.input)?;
-        if let Some(pitch) = self.method.pixel_pitch.filter(|pitch| *pitch != (1.0, 1.0)) {
-            let got = format!("{},{}", pitch.0, pitch.1);
-            return Err(Error::argument("pixel_pitch", "none, as motion is estimated from flow in px", got));
-        }
         let Prepared { plan: stream, is_double, .. } = prepare_with_covariance(
             &opened,
             &self.input,

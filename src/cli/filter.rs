@@ -103,7 +103,7 @@ impl FilterCommand {
         options.sites = self.grid.sampling_grid()?;
         options.sites.shape(opened.first.size)?;
         options.mask = read_mask(self.grid.mask.as_deref(), opened.first.size)?;
-        options.frame_period = opened.numbering.period();
+        options.units = self.filter.units.units(opened.numbering.period());
         (options.threads, options.simd) = compute(&self.compute)?;
         Ok(options)
     }

@@ -171,7 +171,9 @@ fn npz_info(path: &Path) -> Result<Value> {
     info["valid_share"] = json!(valid as f64 / field.len().max(1) as f64);
     info["model"] = json!(field.layout.model);
     info["frame_index"] = json!(field.layout.frame_index);
-    info["frame_period"] = json!(field.layout.frame_period);
+    info["frame_period"] = json!(field.layout.units.frame_period);
+    let units = field.layout.parameters.iter().map(|name| (name.clone(), field.layout.units.of_parameter(name).into()));
+    info["units"] = Value::Object(units.collect());
     info["covariance"] = json!(field.covariance.is_some());
     info["options"] = json!(stored.options);
     info["library"] = json!(stored.library);

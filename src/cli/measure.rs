@@ -8,7 +8,8 @@ use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow, table_target};
 use crate::error::{Error, Result};
 use crate::flow::derived::Quantity;
-use crate::pipeline::Measurements;
+use crate::pipeline::{MeasuredRegion, Measurements};
+use crate::types::Region;
 use clap::Args;
 use serde_json::json;
 use std::path::PathBuf;
@@ -17,8 +18,9 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(
-    after_help = "Rows: frame, time_s, x, y, quantity, value, std, unit, valid_share. For a region (without --region: the whole frame) one affine motion is\n\
-    fitted to its estimates; std knows of their errors, their overlap and their scatter. With --points every point has its rows.\n\
+    after_help = "Rows: frame, time_s, x, y, quantity, value, std, unit, share, valid_share, status. For a region (default: the whole frame) one affine\n\
+    motion is fitted to the estimates that follow it, a share of all; the status is no_dominant_motion and the value NaN where\n\
+    that is half of them or less. std knows of their errors, their overlap and their scatter. With --points every point has its rows.\n\
     Rates are per second where the frame rate is known (--fps, or the file), else per frame; rpm needs it.\n\n\
     Quantities: divergence, curl, shear_magnitude, shear_axis, strain_xx, strain_xy, strain_yy, angular_velocity, rpm,\n\
     rotation_centre_x, rotation_centre_y, centre_distance, time_to_contact, speed\n\n\
@@ -36,6 +38,15 @@ pub struct MeasureCommand {
     pub method: MethodArguments,
     #[command(flatten)]
     pub grid: GridArguments,
+    /// Only a disc, px
+    #[arg(long, value_name = "X,Y,RADIUS", help_heading = "Where", allow_hyphen_values = true, value_parser = parse_disc, conflicts_with_all = ["points", "polygon"])]
+    pub disc: Option<Region>,
+    /// Only a polygon of three corners or more, px
+    #[arg(long, value_name = "X,Y,X,Y,...", help_heading = "Where", allow_hyphen_values = true, value_parser = parse_polygon, conflicts_with = "points")]
+    pub polygon: Option<Region>,
+    /// The motion around this pixel [default: the motion that most of the region follows]
+    #[arg(long, value_name = "X,Y", help_heading = "Where", value_parser = parse_seed, conflicts_with = "points")]
+    pub seed: Option<(f64, f64)>,
     /// A .csv file [default: standard output]
     #[arg(long, short, value_name = "FILE", help_heading = "Output")]
     pub output: Option<PathBuf>,
@@ -67,7 +78,11 @@ impl MeasureCommand {
             &self.compute,
             "for the standard deviations",
         )?;
-        let sink = Measurements::open(&target, quantities)?;
+        let place = MeasuredRegion { region: self.disc.clone().or(self.polygon.clone()), seed: self.seed };
+        if let Some(region) = &place.region {
+            region.check(opened.first.size)?;
+        }
+        let sink = Measurements::open(&target, quantities, place)?;
         let mut details = input_details(&opened, &self.grid);
         details["quantities"] = json!(self.quantity);
         details["method"] = plan.estimator().method().name().into();
@@ -78,5 +93,30 @@ impl MeasureCommand {
         } else {
             run_flow::<f32>(opened, plan, vec![Box::new(sink)], context, watch)
         }
+    }
+}
+
+/// Numbers separated by commas.
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    text.split(',').map(|word| word.trim().parse().ok().filter(|value: &f64| value.is_finite())).collect()
+}
+
+fn parse_disc(text: &str) -> std::result::Result<Region, String> {
+    match numbers(text).as_deref() {
+        Some(&[x, y, radius]) if radius > 0.0 => Ok(Region::Disc { centre: (x, y), radius }),
+        _ => Err("expected X,Y,RADIUS in pixels with a positive radius".into()),
+    }
+}
+
+fn parse_polygon(text: &str) -> std::result::Result<Region, String> {
+    let corners = numbers(text).filter(|values| values.len() >= 6 && values.len() % 2 == 0);
+    let corners = corners.ok_or("expected three corners X,Y,X,Y,X,Y or more, in pixels")?;
+    Ok(Region::Polygon(corners.as_chunks::<2>().0.iter().map(|&[x, y]| (x, y)).collect()))
+}
+
+fn parse_seed(text: &str) -> std::result::Result<(f64, f64), String> {
+    match numbers(text).as_deref() {
+        Some(&[x, y]) => Ok((x, y)),
+        _ => Err("expected X,Y in pixels".into()),
     }
 }

@@ -42,18 +42,22 @@ struct Between {
 /// A point is NaN if it is outside the rectangle of sites (nothing is extrapolated), if a site with a weight
 /// has no valid estimate, and if it was NaN.
 ///
-/// # Errors [`Error::Argument`] naming `field` for a list of points instead of a grid, `pixel_pitch` unless a
-/// pixel is one unit in both directions, `covariance` for another number of matrices than of points.
+/// A field in other units is converted to px and frames first. A field of velocities (`Interval::Instant`)
+/// is taken for steps.
+///
+/// # Errors [`Error::Argument`] naming `field` for a list of points instead of a grid, `covariance` for another
+/// number of matrices than of points.
 pub fn advect<T: Real>(
     field: &FlowField<T>,
     points: &[[f64; 2]],
     covariances: Option<&[PointCovariance]>,
 ) -> Result<Advected> {
-    let lattice = Lattice::of(field)?;
+    let field = field.in_pixels_and_frames();
+    let lattice = Lattice::of(&field)?;
     if let Some(matrices) = covariances.filter(|matrices| matrices.len() != points.len()) {
         return Err(Error::argument("covariance", format!("{} matrices, one a point", points.len()), matrices.len()));
     }
-    let found: Vec<Option<Between>> = points.iter().map(|point| lattice.at(field, *point)).collect();
+    let found: Vec<Option<Between>> = points.iter().map(|point| lattice.at(&field, *point)).collect();
     let moved = |(point, between): (&[f64; 2], &Option<Between>)| match between {
         Some(there) => [point[0] + there.flow[0], point[1] + there.flow[1]],
         None => [f64::NAN; 2],
@@ -93,10 +97,6 @@ impl Lattice {
             let got = format!("a list of {} points", field.len());
             return Err(Error::argument("field", "one on a grid of pixels, to interpolate in", got));
         };
-        if layout.pixel_pitch != (1.0, 1.0) {
-            let (dx, dy) = layout.pixel_pitch;
-            return Err(Error::argument("pixel_pitch", "1, for flow in px/frame", format!("({dx}, {dy})")));
-        }
         let Rect { x, y, .. } = region.unwrap_or(Rect { x: 0, y: 0, width: 0, height: 0 });
         let has_slopes = MOTION_NAMES[2..].iter().any(|name| layout.parameters.iter().any(|known| known == name));
         Ok(Self { origin: [x as f64, y as f64], stride: *stride as f64, has_slopes })

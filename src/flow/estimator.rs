@@ -5,7 +5,7 @@ use super::coarse_to_fine::CoarseToFine;
 use super::instantaneous::Instantaneous;
 use super::intake::Intake;
 use super::methods::Method;
-use super::model::{ModelKind, Parameter};
+use super::model::ModelKind;
 use super::options::EstimatorOptions;
 use super::windowed::Windowed;
 use crate::error::{Error, Result};
@@ -154,8 +154,8 @@ impl Estimator {
             sites: self.options.sites.clone(),
             model: model.name().into(),
             parameters: model.parameters().iter().map(|p| p.name.to_string()).collect(),
-            frame_period: self.options.frame_period,
-            pixel_pitch: self.options.pixel_pitch,
+            units: self.options.units.clone(),
+            interval: self.method.interval(),
             frame_index: first_index + self.reference_frame(),
             correlation_length: self.method.correlation_length(),
         }
@@ -259,34 +259,8 @@ impl Estimator {
             (Engine::LucasKanade(e), _) => e.estimate_into(frames, options, field)?,
             (Engine::HornSchunck(e), _) => e.estimate_into(frames, options, field)?,
         }
-        if options.pixel_pitch != (1.0, 1.0) {
-            to_pitch(field, self.model().parameters(), options.pixel_pitch);
-        }
+        let units = std::mem::take(&mut field.layout.units);
+        field.convert(units);
         Ok(())
-    }
-}
-
-/// From px to units of the pixel pitch.
-fn to_pitch<T: SimdReal>(field: &mut FlowField<T>, parameters: &[Parameter], pitch: (f64, f64)) {
-    let n = field.len();
-    if n == 0 {
-        return;
-    }
-    let scale: Vec<f64> = parameters.iter().map(|p| p.scale(pitch)).collect();
-    let by = |plane: &mut [T], factor: f64| {
-        if factor != 1.0 {
-            for v in plane {
-                *v *= T::from_f64(factor);
-            }
-        }
-    };
-    for (plane, &factor) in field.motion.chunks_mut(n).zip(&scale) {
-        by(plane, factor);
-    }
-    for covariance in [&mut field.covariance, &mut field.systematic].into_iter().flatten() {
-        let pairs = (0..scale.len()).flat_map(|i| (i..scale.len()).map(move |j| (i, j)));
-        for (plane, (i, j)) in covariance.chunks_mut(n).zip(pairs) {
-            by(plane, scale[i] * scale[j]);
-        }
     }
 }

@@ -32,6 +32,7 @@ use super::options::RankPolicy;
 use super::windowed::{RowSet, WindowedOptions};
 use crate::error::{Error, Result};
 use crate::jet::{Neighbourhood, TimeScheme};
+use crate::types::Interval;
 
 /// The time scheme of two frames.
 pub const PAIR: &str = "pair";
@@ -177,6 +178,25 @@ impl Method {
     pub fn info(&self) -> &'static MethodInfo {
         let named = METHODS.iter().find(|method| method.name == self.name());
         named.unwrap_or(&METHODS[0])
+    }
+
+    /// The same estimate from two frames, where three give the step to the next frame; `None` for others.
+    pub fn as_pair(&self) -> Option<Self> {
+        match self {
+            Self::CoarseToFine(options) if options.frames == 3 && !options.central => {
+                Some(Self::CoarseToFine(CoarseToFineOptions { frames: 2, ..options.clone() }))
+            }
+            _ => None,
+        }
+    }
+
+    /// The time over which the flow is taken.
+    pub fn interval(&self) -> Interval {
+        match self {
+            Self::CoarseToFine(options) if options.frames == 3 && options.central => Interval::Central,
+            Self::CoarseToFine(_) => Interval::Forward,
+            _ => Interval::Instant,
+        }
     }
 
     /// Standard deviation, px, of the weights that an estimate sums its data with: the distance over which

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{Frame, Mask, SamplingGrid, choices};
+use crate::types::{Frame, Mask, SamplingGrid, Units, choices};
 use std::sync::Arc;
 
 /// Report where the equations do not determine every unknown.
@@ -48,10 +48,8 @@ pub struct EstimatorOptions {
     /// Flow that competes with the one that the frames alone give, for methods that start from one
     /// ([`MethodInfo::takes_initial`](super::MethodInfo)). Default: none.
     pub initial: Option<Arc<InitialFlow>>,
-    /// Physical size `(dx, dy)` of a pixel; flow comes in these units per frame. Default: 1 px.
-    pub pixel_pitch: (f64, f64),
-    /// Seconds between frames, kept with the result for quantities per second. Default: unknown.
-    pub frame_period: Option<f64>,
+    /// What the field's lengths and times are measured in. Default: px and frames.
+    pub units: Units,
     /// Whether to compute the covariance of the parameters. Default: no.
     pub covariance: bool,
     /// Whether to report the systematic part of the covariance, if the method has one
@@ -73,8 +71,7 @@ impl Default for EstimatorOptions {
             sites: SamplingGrid::default(),
             mask: None,
             initial: None,
-            pixel_pitch: (1.0, 1.0),
-            frame_period: None,
+            units: Units::default(),
             covariance: false,
             systematic: false,
             diagnostics: false,
@@ -88,14 +85,7 @@ impl Default for EstimatorOptions {
 impl EstimatorOptions {
     /// Checks lengths, times and noise levels, and the environment if it decides.
     pub(super) fn check(&self) -> Result<()> {
-        let positive = |v: f64| v.is_finite() && v > 0.0;
-        let (dx, dy) = self.pixel_pitch;
-        if !(positive(dx) && positive(dy)) {
-            return Err(Error::argument("pixel_pitch", "two positive, finite lengths", format!("({dx}, {dy})")));
-        }
-        if let Some(period) = self.frame_period.filter(|p| !positive(*p)) {
-            return Err(Error::argument("frame_period", "a positive number of seconds", period));
-        }
+        self.units.check()?;
         if let Some(noise) = self.noise.filter(|n| !(n.is_finite() && *n >= 0.0)) {
             return Err(Error::argument("noise", "a standard deviation of 0 grey levels or more", noise));
         }

@@ -14,7 +14,7 @@
 use super::{npy::Element, npz::NpzReader, npz::NpzWriter};
 use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::types::{FieldLayout, FlowField, Rect, SamplingGrid, Status};
+use crate::types::{FieldLayout, FlowField, Interval, Rect, SamplingGrid, Status, Units};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::{Read, Seek, Write};
@@ -35,9 +35,13 @@ pub(super) struct Metadata {
     units: Vec<String>,
     frame_size: [usize; 2],
     frame_index: usize,
-    /// Seconds between frames, if known.
+    /// Seconds between frames, if known: times are then in seconds.
     frame_period: Option<f64>,
     pixel_pitch: [f64; 2],
+    /// Unit of lengths: px, or that of the pixel pitch.
+    length_unit: String,
+    /// The time over which the flow is taken.
+    interval: String,
     /// How far errors of neighbours go together, px; absent: not known.
     #[serde(default)]
     correlation_length: f64,
@@ -55,7 +59,7 @@ pub(super) struct Metadata {
 }
 
 /// Highest layout version this library reads.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const FORMAT: &str = "jacoflow.field";
 
 impl Metadata {
@@ -70,11 +74,13 @@ impl Metadata {
             library: concat!("jacoflow ", env!("CARGO_PKG_VERSION")).into(),
             model: layout.model.clone(),
             parameters: layout.parameters.clone(),
-            units: layout.parameters.iter().map(|p| unit(p, layout.pixel_pitch).into()).collect(),
+            units: layout.parameters.iter().map(|p| layout.units.of_parameter(p)).collect(),
             frame_size: [layout.frame_size.0, layout.frame_size.1],
             frame_index: layout.frame_index,
-            frame_period: layout.frame_period,
-            pixel_pitch: [layout.pixel_pitch.0, layout.pixel_pitch.1],
+            frame_period: layout.units.frame_period,
+            pixel_pitch: layout.units.pixel_pitch.into(),
+            length_unit: layout.units.length.clone(),
+            interval: layout.interval.name().into(),
             correlation_length: layout.correlation_length,
             region,
             stride,
@@ -98,23 +104,11 @@ impl Metadata {
             },
             model: self.model.clone(),
             parameters: self.parameters.clone(),
-            frame_period: self.frame_period,
-            pixel_pitch: (self.pixel_pitch[0], self.pixel_pitch[1]),
+            units: Units::new(self.pixel_pitch.into(), Some(&self.length_unit), self.frame_period),
+            interval: Interval::ALL.into_iter().find(|known| known.name() == self.interval).unwrap_or_default(),
             frame_index: self.frame_index,
             correlation_length: self.correlation_length,
         }
-    }
-}
-
-/// Unit of a parameter: velocities per frame, derivatives per frame, accelerations per frame squared.
-fn unit(parameter: &str, pitch: (f64, f64)) -> &'static str {
-    let physical = pitch != (1.0, 1.0);
-    match parameter {
-        "u" | "v" if physical => "pitch unit/frame",
-        "u" | "v" => "px/frame",
-        "u_t" | "v_t" if physical => "pitch unit/frame^2",
-        "u_t" | "v_t" => "px/frame^2",
-        _ => "1/frame",
     }
 }
 

@@ -31,7 +31,7 @@ impl FlowImage {
         Ok(Self { width, height, u, v })
     }
 
-    /// The flow of a field on a grid, one pixel a site, back in px/frame for any pixel pitch of the field.
+    /// The flow of a field on a grid, one pixel a site, back in px/frame for any units of the field.
     ///
     /// # Errors
     /// [`Error::Argument`] named `sites` for a field of points, which is no picture.
@@ -43,12 +43,12 @@ impl FlowImage {
                 "a list of points",
             ));
         }
-        let (dx, dy) = field.layout.pixel_pitch;
         let n = field.len();
-        let plane = |p: usize, pitch: f64| {
-            field.motion[p * n..(p + 1) * n].iter().map(|m| (m.to_f64() / pitch) as f32).collect()
+        let plane = |p: usize, name: &str| {
+            let scale = field.layout.units.scale(name);
+            field.motion[p * n..(p + 1) * n].iter().map(|m| (m.to_f64() / scale) as f32).collect()
         };
-        Self::new(field.width, field.height, plane(0, dx), plane(1, dy))
+        Self::new(field.width, field.height, plane(0, "u"), plane(1, "v"))
     }
 
     /// As a translational field: every pixel a site, status `Unobservable` where the flow is unknown.

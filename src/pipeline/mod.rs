@@ -29,8 +29,8 @@ pub use particle::{
 pub use prefetch::{FirstFrame, READ_AHEAD, peek};
 pub use run::{Numbering, Pipeline, Summary};
 pub use sink::{
-    Collect, Egomotion, EgomotionPlan, Ending, FieldSink, Fields, Measurements, PictureRanges, Pictures, Rows, Sink,
-    Step, Table, TableTarget,
+    Collect, Egomotion, EgomotionPlan, Ending, FieldSink, Fields, MeasuredRegion, Measurements, PictureRanges,
+    Pictures, Rows, Sink, Step, Table, TableTarget,
 };
 pub use stage::{FilterStage, Output, Stage};
 pub use stereo::{

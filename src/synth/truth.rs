@@ -3,7 +3,7 @@
 use super::Scene;
 use crate::error::{Error, Result};
 use crate::parallel::for_each_band;
-use crate::types::{AffineFlow, FieldLayout, FlowField, MOTION_NAMES, SamplingGrid, Status};
+use crate::types::{AffineFlow, FieldLayout, FlowField, Interval, MOTION_NAMES, SamplingGrid, Status, Units};
 
 /// Half the step of the central differences of displacements, px: errors are near 1e-9.
 const STEP: f64 = 1e-3;
@@ -13,7 +13,7 @@ const STEP: f64 = 1e-3;
 /// # Errors
 /// None for a well-formed scene; passes on what [`FlowField::empty`] reports.
 pub fn truth(scene: &dyn Scene, t: f64) -> Result<FlowField<f64>> {
-    field(scene, t, |x, y| scene.motion(x, y, t).map(AffineFlow::to_array))
+    field(scene, t, Interval::Instant, |x, y| scene.motion(x, y, t).map(AffineFlow::to_array))
 }
 
 /// The motion that two frames determine: the mean velocity, between the times `t + from` and `t + to`, of
@@ -39,7 +39,12 @@ pub fn mean_truth(scene: &dyn Scene, t: f64, (from, to): (f64, f64)) -> Result<F
         let (before, after) = (since(x, y, from)?, since(x, y, to)?);
         Some(((after.0 - before.0) / (to - from), (after.1 - before.1) / (to - from)))
     };
-    field(scene, t, |x, y| {
+    let interval = match (from, to) {
+        (0.0, 1.0) => Interval::Forward,
+        (-1.0, 1.0) => Interval::Central,
+        _ => Interval::Instant,
+    };
+    field(scene, t, interval, |x, y| {
         let (u, v) = mean(x, y)?;
         let (right, left, below, above) =
             (mean(x + STEP, y)?, mean(x - STEP, y)?, mean(x, y + STEP)?, mean(x, y - STEP)?);
@@ -51,14 +56,19 @@ pub fn mean_truth(scene: &dyn Scene, t: f64, (from, to): (f64, f64)) -> Result<F
 }
 
 /// The field whose motion at scene point `(x, y)` is `motion(x, y)`.
-fn field(scene: &dyn Scene, t: f64, motion: impl Fn(f64, f64) -> Option<[f64; 6]> + Sync) -> Result<FlowField<f64>> {
+fn field(
+    scene: &dyn Scene,
+    t: f64,
+    interval: Interval,
+    motion: impl Fn(f64, f64) -> Option<[f64; 6]> + Sync,
+) -> Result<FlowField<f64>> {
     let layout = FieldLayout {
         frame_size: scene.size(),
         sites: SamplingGrid::default(),
         model: "truth".into(),
         parameters: MOTION_NAMES.map(String::from).to_vec(),
-        frame_period: None,
-        pixel_pitch: (1.0, 1.0),
+        units: Units::default(),
+        interval,
         frame_index: t.max(0.0).round() as usize,
         correlation_length: 0.0,
     };

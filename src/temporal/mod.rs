@@ -8,6 +8,7 @@
 //!   estimates over time.
 
 mod any_filter;
+mod any_stream;
 mod flow_filter;
 mod kernel;
 mod measurement;
@@ -18,8 +19,9 @@ mod store;
 mod stream;
 
 pub use any_filter::AnyFlowFilter;
+pub use any_stream::{AnyFlowStream, Stream};
 pub use flow_filter::FlowFilter;
 pub use options::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
 pub use persist::SavedFilter;
 pub use recursive::{RecursiveFusion, RecursiveOptions};
-pub use stream::{AnyFlowStream, FlowStream, Stream, StreamPlan};
+pub use stream::{FlowStream, StreamPlan};

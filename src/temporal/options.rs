@@ -5,7 +5,7 @@ use crate::filter::SigmaPoints;
 use crate::jet::Neighbourhood;
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{Mask, SamplingGrid, choices};
+use crate::types::{Mask, SamplingGrid, Units, choices};
 use serde::{Deserialize, Serialize};
 
 /// How the non-linear prediction is carried out.
@@ -104,10 +104,8 @@ pub struct FlowFilterOptions {
     pub mask: Option<Mask>,
     /// Deliver the 6x6 covariance of the motion with each field (21 planes).
     pub covariance: bool,
-    /// Physical size `(dx, dy)` of a pixel: fields come in these units. States stay in px.
-    pub pixel_pitch: (f64, f64),
-    /// Seconds between frames, noted in the fields.
-    pub frame_period: Option<f64>,
+    /// What the fields' lengths and times are measured in. States stay in px and frames.
+    pub units: Units,
     /// Threads; results do not depend on their number. They belong to the run, not to a saved state.
     #[serde(skip)]
     pub threads: Threads,
@@ -156,8 +154,7 @@ impl FlowFilterOptions {
             sites: SamplingGrid::default(),
             mask: None,
             covariance: false,
-            pixel_pitch: (1.0, 1.0),
-            frame_period: None,
+            units: Units::default(),
             threads: Threads::default(),
             simd: None,
         }
@@ -194,10 +191,7 @@ impl FlowFilterOptions {
         all("initial_mean", &self.initial_mean, "twelve finite numbers", &|_| true)?;
         all("initial_covariance", &self.initial_covariance, "twelve finite variances, each > 0", &|v| v > 0.0)?;
         all("full_scale", &[self.full_scale], "a finite number > 0", &|v| v > 0.0)?;
-        all("pixel_pitch", &[self.pixel_pitch.0, self.pixel_pitch.1], "two finite lengths > 0", &|v| v > 0.0)?;
-        if let Some(period) = self.frame_period {
-            all("frame_period", &[period], "a finite time > 0", &|v| v > 0.0)?;
-        }
+        self.units.check()?;
         self.sigma_points.check(12)?;
         self.threads.check()?;
         Level::check(self.simd)?;

@@ -7,14 +7,21 @@ use crate::flow::{Estimator, Method};
 use crate::image::Preprocess;
 use crate::math::Real;
 use crate::simd::{SimdReal, same_mut};
-use crate::types::{AnyField, AnyFrame, FlowField, Frame, Precision, Sample, Status};
+use crate::types::{AnyFrame, FlowField, Frame, Interval, Sample, Status, Units};
 use std::collections::VecDeque;
 use std::sync::Arc;
+
+/// Relative difference of the two steps of a triple above which its motion is that of the second step alone.
+const UNEVEN_STEPS: f64 = 0.01;
 
 /// What the frames of a stream pass through, checked.
 #[derive(Debug, Clone)]
 pub struct StreamPlan {
     estimator: Arc<Estimator>,
+    /// Estimates the step to the next frame without the frame before, where the estimator takes three.
+    pair_estimator: Option<Arc<Estimator>>,
+    /// Whether frames come in pairs: no field joins one to the next.
+    is_double_frame: bool,
     preprocess: Preprocess,
     recursive: Option<RecursiveOptions>,
 }
@@ -30,7 +37,25 @@ impl StreamPlan {
         if let Some(options) = recursive {
             RecursiveFusion::<f32>::new(&estimator, options)?;
         }
-        Ok(Self { estimator: Arc::new(estimator), preprocess, recursive })
+        let pair = estimator.method().as_pair().map(|method| Estimator::new(method, estimator.options().clone()));
+        let pair_estimator = pair.transpose()?.map(Arc::new);
+        Ok(Self { estimator: Arc::new(estimator), pair_estimator, is_double_frame: false, preprocess, recursive })
+    }
+
+    /// For frames that come in pairs, 0 and 1, 2 and 3, ...: a field for each pair.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `pairs` for an estimator of three frames or estimates that are fused.
+    pub fn of_pairs(self) -> Result<Self> {
+        let needed = self.estimator.frames_needed();
+        if needed != 2 {
+            let expected = "a method that takes two frames (time_scheme \"pair\")";
+            return Err(Error::argument("pairs", expected, format!("one of {needed} frames")));
+        }
+        if self.recursive.is_some() {
+            return Err(Error::argument("pairs", "no fusion over time", "temporal \"recursive\""));
+        }
+        Ok(Self { is_double_frame: true, ..self })
     }
 
     /// The estimator.
@@ -46,6 +71,8 @@ pub struct FlowStream<T: Real> {
     fusion: Option<RecursiveFusion<T>>,
     /// Prepared frames, oldest first.
     frames: VecDeque<Arc<Frame<T>>>,
+    /// Their times, s, where they are known.
+    times: VecDeque<Option<f64>>,
     pushed: usize,
 }
 
@@ -53,15 +80,25 @@ impl<T: SimdReal> FlowStream<T> {
     /// A stream without frames.
     pub fn new(plan: StreamPlan) -> Result<Self> {
         let fusion = plan.recursive.map(|options| RecursiveFusion::new(&plan.estimator, options)).transpose()?;
-        Ok(Self { plan, fusion, frames: VecDeque::new(), pushed: 0 })
+        Ok(Self { plan, fusion, frames: VecDeque::new(), times: VecDeque::new(), pushed: 0 })
     }
 
     /// Takes the next frame; returns a field once there are enough. Its `frame_index` counts frames from 0.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `frames` for a frame of another size, and those of the estimator; the frame
-    /// is then not kept.
+    /// As [`push_at`](Self::push_at).
     pub fn push(&mut self, frame: AnyFrame) -> Result<Option<FlowField<T>>> {
+        self.push_at(frame, None)
+    }
+
+    /// As [`push`](Self::push), for a frame taken at `time`, s: the field's frame period is that of its own
+    /// frames. Where the steps of a triple differ, the step to the next frame is estimated from its two frames.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `frames` for a frame of another size, `time` for one not after that of the
+    /// frame before, and those of the estimator; the frame is then not kept.
+    pub fn push_at(&mut self, frame: AnyFrame, time: Option<f64>) -> Result<Option<FlowField<T>>> {
+        self.check_time(time)?;
         if let Some(first) = self.frames.front().filter(|first| first.size() != frame.size()) {
             let text = |(width, height): (usize, usize)| format!("{width} x {height}");
             let expected = format!("frames of one size (the first is {})", text(first.size()));
@@ -69,12 +106,18 @@ impl<T: SimdReal> FlowStream<T> {
         }
         let StreamPlan { estimator, preprocess, .. } = &self.plan;
         let needed = estimator.frames_needed();
+        if self.plan.is_double_frame && self.frames.len() == needed {
+            self.frames.drain(..).for_each(recycle);
+            self.times.clear();
+        }
         let frame = estimator.options().threads.install(|| Ok(preprocess.apply(into_real(frame)?)))?;
         self.frames.push_back(Arc::new(frame));
+        self.times.push_back(time);
         if self.frames.len() > needed
             && let Some(oldest) = self.frames.pop_front()
         {
             recycle(oldest);
+            self.times.pop_front();
         }
         self.pushed += 1;
         if self.frames.len() < needed {
@@ -83,9 +126,54 @@ impl<T: SimdReal> FlowStream<T> {
         let field = self.estimate();
         if field.is_err() {
             self.frames.pop_back();
+            self.times.pop_back();
             self.pushed -= 1;
         }
         field.map(Some)
+    }
+
+    fn check_time(&self, time: Option<f64>) -> Result<()> {
+        let refuse = |expected: String| {
+            let got = time.map_or_else(|| "none".to_string(), |time| format!("{time} s"));
+            Err(Error::argument("time", expected, got))
+        };
+        match (self.times.back(), time) {
+            (_, Some(time)) if !time.is_finite() => refuse("a finite time, s".into()),
+            (Some(Some(last)), Some(time)) if time <= *last => {
+                refuse(format!("a time after {last} s, that of the last frame"))
+            }
+            (Some(Some(_)), None) => refuse("a time for every frame, as the last one had".into()),
+            (Some(None), Some(_)) => refuse("no time, as the last frame had none".into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// The step from the first frame of the stream to the second, once both have come and no more, where the
+    /// estimator takes three frames: there is no frame before. `None` for other methods and streams.
+    ///
+    /// # Errors
+    /// Those of the estimator.
+    pub fn first_step(&self) -> Result<Option<FlowField<T>>> {
+        let is_start = self.pushed == 2 && self.frames.len() == 2 && self.fusion.is_none();
+        let Some(pair) = self.plan.pair_estimator.as_ref().filter(|_| is_start) else { return Ok(None) };
+        let mut field = pair.estimate(&[&*self.frames[0], &*self.frames[1]], 0)?;
+        self.set_period(&mut field, 0);
+        Ok(Some(field))
+    }
+
+    /// Seconds from frame `k` of the ring to the next.
+    fn step(&self, k: usize) -> Option<f64> {
+        Some((*self.times.get(k + 1)?)? - (*self.times.get(k)?)?)
+    }
+
+    /// Gives a field whose flow begins at frame `k` of the ring the period of its own frames.
+    fn set_period(&self, field: &mut FlowField<T>, k: usize) {
+        let (first, last) = (self.times.front().copied().flatten(), self.times.back().copied().flatten());
+        let mean = || Some((last? - first?) / (self.times.len().max(2) - 1) as f64);
+        let period = if field.layout.interval == Interval::Forward { self.step(k) } else { mean() };
+        if period.is_some() {
+            field.convert(Units { frame_period: period, ..field.layout.units.clone() });
+        }
     }
 
     /// What the frames pass through.
@@ -108,23 +196,28 @@ impl<T: SimdReal> FlowStream<T> {
         self.frames.iter().map(AsRef::as_ref)
     }
 
+    /// Their times, s, oldest first.
+    pub fn times(&self) -> impl Iterator<Item = Option<f64>> {
+        self.times.iter().copied()
+    }
+
     /// Number of sites and state of the fusion over time, if there is one.
     pub fn fused(&self) -> Option<(usize, &[T])> {
         self.fusion.as_ref().map(RecursiveFusion::state)
     }
 
-    /// Replaces the state by that of another stream with the same plan: its [`frames`](Self::frames),
-    /// [`pushed`](Self::pushed) and [`fused`](Self::fused).
+    /// Replaces the state by that of another stream with the same plan: its [`frames`](Self::frames) with their
+    /// [`times`](Self::times), [`pushed`](Self::pushed) and [`fused`](Self::fused).
     ///
     /// # Errors
     /// [`Error::Argument`] naming `state` where the fusion's numbers do not fit its number of sites.
     pub fn restore(
         &mut self,
-        frames: impl IntoIterator<Item = Frame<T>>,
+        frames: impl IntoIterator<Item = (Frame<T>, Option<f64>)>,
         pushed: usize,
         fused: Option<(usize, Vec<T>)>,
     ) -> Result<()> {
-        self.frames = frames.into_iter().map(Arc::new).collect();
+        (self.frames, self.times) = frames.into_iter().map(|(frame, time)| (Arc::new(frame), time)).unzip();
         self.pushed = pushed;
         match (&mut self.fusion, fused) {
             (Some(fusion), Some((sites, state))) => fusion.restore(sites, state),
@@ -134,7 +227,16 @@ impl<T: SimdReal> FlowStream<T> {
 
     fn estimate(&mut self) -> Result<FlowField<T>> {
         let frames: Vec<&Frame<T>> = self.frames.iter().map(AsRef::as_ref).collect();
-        let mut field = estimate_pooled(&self.plan.estimator, &frames, self.pushed - frames.len())?;
+        let (first, reference) = (self.pushed - frames.len(), self.plan.estimator.reference_frame());
+        let is_uneven = match (self.step(0), self.step(1)) {
+            (Some(before), Some(after)) => (before - after).abs() > UNEVEN_STEPS * after,
+            _ => false,
+        };
+        let mut field = match self.plan.pair_estimator.as_ref().filter(|_| is_uneven) {
+            Some(pair) => estimate_pooled(pair, &frames[reference..], first + reference)?,
+            None => estimate_pooled(&self.plan.estimator, &frames, first)?,
+        };
+        self.set_period(&mut field, reference);
         if let Some(fusion) = &mut self.fusion {
             fusion.fuse(&mut field)?;
             field.systematic = None;
@@ -211,87 +313,4 @@ fn estimate_pooled<T: SimdReal>(
     };
     estimator.estimate_into(frames, first_index, &mut field)?;
     Ok(field)
-}
-
-/// A [`FlowStream`] whose precision and sample type are those of its first frame.
-#[derive(Debug)]
-pub struct AnyFlowStream {
-    plan: StreamPlan,
-    precision: Precision,
-    /// Sample type of the first frame.
-    dtype: Option<&'static str>,
-    stream: Stream,
-}
-
-/// The stream in the precision that the first frame has decided.
-#[derive(Debug)]
-pub enum Stream {
-    /// Before the first frame.
-    Empty,
-    /// float32.
-    Single(FlowStream<f32>),
-    /// float64.
-    Double(FlowStream<f64>),
-}
-
-impl AnyFlowStream {
-    /// A stream without frames.
-    pub fn new(plan: StreamPlan, precision: Precision) -> Self {
-        Self { plan, precision, dtype: None, stream: Stream::Empty }
-    }
-
-    /// As [`FlowStream::push`].
-    ///
-    /// # Errors
-    /// Also [`Error::Type`] naming `frames` for another sample type than that of the first frame.
-    pub fn push(&mut self, frame: AnyFrame) -> Result<Option<AnyField>> {
-        let dtype = frame.dtype();
-        let expected = *self.dtype.get_or_insert(dtype);
-        if dtype != expected {
-            let expected = format!("{expected} like the first frame");
-            return Err(Error::Type { argument: "frames", expected, got: dtype.into() });
-        }
-        if matches!(self.stream, Stream::Empty) {
-            let plan = self.plan.clone();
-            self.stream = if self.precision.is_double(dtype) {
-                Stream::Double(FlowStream::new(plan)?)
-            } else {
-                Stream::Single(FlowStream::new(plan)?)
-            };
-        }
-        match &mut self.stream {
-            Stream::Empty => Ok(None),
-            Stream::Single(stream) => Ok(stream.push(frame)?.map(AnyField::Single)),
-            Stream::Double(stream) => Ok(stream.push(frame)?.map(AnyField::Double)),
-        }
-    }
-
-    /// Forgets every frame.
-    pub fn reset(&mut self) {
-        (self.dtype, self.stream) = (None, Stream::Empty);
-    }
-
-    /// Replaces the stream by one whose first frame had samples of type `dtype`.
-    pub fn resume(&mut self, dtype: &'static str, stream: Stream) {
-        (self.dtype, self.stream) = (Some(dtype), stream);
-    }
-
-    /// What the frames pass through.
-    pub fn plan(&self) -> &StreamPlan {
-        &self.plan
-    }
-
-    /// The stream, and the sample type of its first frame.
-    pub fn stream(&self) -> (Option<&'static str>, &Stream) {
-        (self.dtype, &self.stream)
-    }
-
-    /// Number of frames pushed since the start or the last reset.
-    pub fn pushed(&self) -> usize {
-        match &self.stream {
-            Stream::Empty => 0,
-            Stream::Single(stream) => stream.pushed(),
-            Stream::Double(stream) => stream.pushed(),
-        }
-    }
 }

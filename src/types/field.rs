@@ -1,8 +1,9 @@
 //! The result of an estimator: planes of motion parameters, their covariance and their status.
 
-use super::{AffineFlow, MOTION_NAMES, SamplingGrid, Status};
+use super::{AffineFlow, Interval, MOTION_NAMES, SamplingGrid, Status, Units};
 use crate::error::{Error, Result};
 use crate::math::Real;
+use std::borrow::Cow;
 
 /// What a field holds at each site and where the sites are.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,10 +16,10 @@ pub struct FieldLayout {
     pub model: String,
     /// Names of the model's parameters, in plane order. The first two are always `u`, `v`.
     pub parameters: Vec<String>,
-    /// Seconds between frames; `None`: rates are per frame.
-    pub frame_period: Option<f64>,
-    /// Physical size `(dx, dy)` of a pixel. Flow is in these units per frame.
-    pub pixel_pitch: (f64, f64),
+    /// What lengths and times are measured in.
+    pub units: Units,
+    /// The time over which the flow is taken.
+    pub interval: Interval,
     /// Index of the frame the estimate belongs to, counted from the first frame of the sequence.
     pub frame_index: usize,
     /// Length `l`, px, of the correlation of neighbouring errors: about `exp(-d^2 / (4 l^2))` at distance
@@ -29,7 +30,7 @@ pub struct FieldLayout {
 /// Flow with its Jacobian at `width x height` sites (points: one row), as planes.
 ///
 /// Plane `p` of `motion` is parameter `layout.parameters[p]`; each plane is row-major. For the affine model
-/// they are `u, v, u_x, v_x, u_y, v_y` in px/frame and 1/frame (or in `pixel_pitch` units per frame).
+/// they are `u, v, u_x, v_x, u_y, v_y` in px/frame and 1/frame, or in the [`Units`] of the layout.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlowField<T> {
     /// What the planes mean.
@@ -77,8 +78,8 @@ impl<T: Real> FlowField<T> {
             sites: SamplingGrid::default(),
             model: model.into(),
             parameters: MOTION_NAMES[..p].iter().map(|&name| name.into()).collect(),
-            frame_period: None,
-            pixel_pitch: (1.0, 1.0),
+            units: Units::default(),
+            interval: Interval::Forward,
             frame_index: 0,
             correlation_length: 0.0,
         };
@@ -127,6 +128,53 @@ impl<T: Real> FlowField<T> {
             window: None,
             layout,
         })
+    }
+
+    /// The field of frame `frame_index` of the same sequence, at which there is no estimate: NaN with status
+    /// `MissingFrame`.
+    pub fn missing(&self, frame_index: usize) -> Self {
+        let unknown = |planes: &Vec<T>| vec![T::nan(); planes.len()];
+        Self {
+            layout: FieldLayout { frame_index, ..self.layout.clone() },
+            width: self.width,
+            height: self.height,
+            motion: unknown(&self.motion),
+            covariance: self.covariance.as_ref().map(unknown),
+            systematic: self.systematic.as_ref().map(unknown),
+            status: vec![Status::MissingFrame; self.status.len()],
+            residual: self.residual.as_ref().map(unknown),
+            rank: self.rank.as_ref().map(|rank| vec![0; rank.len()]),
+            condition: self.condition.as_ref().map(unknown),
+            window: self.window.as_ref().map(unknown),
+        }
+    }
+
+    /// Multiplies motion and covariance so that they come in `units` instead of those of the layout.
+    pub fn convert(&mut self, units: Units) {
+        let n = self.len().max(1);
+        let factor = |name: &String| units.scale(name) / self.layout.units.scale(name);
+        let scale: Vec<f64> = self.layout.parameters.iter().map(factor).collect();
+        let by = |plane: &mut [T], factor: f64| {
+            if factor != 1.0 {
+                plane.iter_mut().for_each(|value| *value *= T::from_f64(factor));
+            }
+        };
+        self.motion.chunks_mut(n).zip(&scale).for_each(|(plane, &factor)| by(plane, factor));
+        for covariance in [&mut self.covariance, &mut self.systematic].into_iter().flatten() {
+            let pairs = (0..scale.len()).flat_map(|i| (i..scale.len()).map(move |j| (i, j)));
+            covariance.chunks_mut(n).zip(pairs).for_each(|(plane, (i, j))| by(plane, scale[i] * scale[j]));
+        }
+        self.layout.units = units;
+    }
+
+    /// The field in px and frames.
+    pub fn in_pixels_and_frames(&self) -> Cow<'_, Self> {
+        if self.layout.units.are_pixels_and_frames() {
+            return Cow::Borrowed(self);
+        }
+        let mut field = self.clone();
+        field.convert(Units::default());
+        Cow::Owned(field)
     }
 
     /// Number of sites.

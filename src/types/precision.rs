@@ -49,3 +49,13 @@ pub enum AnyField {
     /// float64.
     Double(FlowField<f64>),
 }
+
+impl AnyField {
+    /// Index of the frame that the field belongs to.
+    pub fn frame_index(&self) -> usize {
+        match self {
+            Self::Single(field) => field.layout.frame_index,
+            Self::Double(field) => field.layout.frame_index,
+        }
+    }
+}

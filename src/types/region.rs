@@ -1,6 +1,7 @@
-//! Pixels at which estimates are made.
+//! Parts of a frame: regions, and the pixels at which estimates are made.
 
-use crate::error::{Error, Result};
+use super::Mask;
+use crate::error::{Error, Result, numbers};
 
 /// A rectangle of pixels: columns `x .. x + width`, rows `y .. y + height`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,6 +30,71 @@ impl From<[usize; 4]> for Rect {
 impl From<Rect> for [usize; 4] {
     fn from(Rect { x, y, width, height }: Rect) -> Self {
         [x, y, width, height]
+    }
+}
+
+/// A part of a frame. A pixel belongs to it if its centre does.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Region {
+    /// A rectangle.
+    Rect(Rect),
+    /// A disc.
+    Disc {
+        /// Its centre `(x, y)`, px.
+        centre: (f64, f64),
+        /// Its radius, px; the edge belongs to it.
+        radius: f64,
+    },
+    /// A polygon of corners `(x, y)`, px, closed from the last to the first; of one that crosses itself the
+    /// part that a line from far away enters an odd number of times.
+    Polygon(Vec<(f64, f64)>),
+    /// The pixels that are true.
+    Mask(Mask),
+}
+
+impl Region {
+    /// # Errors
+    /// [`Error::Argument`] naming `region` unless it fits a frame of `size = (width, height)`: a rectangle
+    /// inside it, a positive radius, three finite corners or more, a mask of the same size.
+    pub fn check(&self, size: (usize, usize)) -> Result<()> {
+        let wrong = |expected: &str, got: String| Err(Error::argument("region", expected, got));
+        match self {
+            Self::Rect(rect) => SamplingGrid::Grid { region: Some(*rect), stride: 1 }.shape(size).map(|_| ()),
+            Self::Disc { centre: (x, y), radius } => {
+                let is_usable = x.is_finite() && y.is_finite() && radius.is_finite() && *radius > 0.0;
+                let got = numbers([x, y, radius]);
+                if is_usable { Ok(()) } else { wrong("a disc (x, y, radius) of positive radius, px", got) }
+            }
+            Self::Polygon(corners) if corners.len() < 3 => {
+                wrong("a polygon of at least 3 corners (x, y)", format!("{} corners", corners.len()))
+            }
+            Self::Polygon(corners) => match corners.iter().find(|(x, y)| !(x.is_finite() && y.is_finite())) {
+                Some((x, y)) => wrong("a polygon of finite corners (x, y), px", numbers([x, y])),
+                None => Ok(()),
+            },
+            Self::Mask(mask) if mask.size() == size => Ok(()),
+            Self::Mask(mask) => {
+                let expected = format!("a mask of the frame's shape ({}, {})", size.1, size.0);
+                wrong(&expected, format!("({}, {})", mask.height(), mask.width()))
+            }
+        }
+    }
+
+    /// Whether the pixel `(x, y)` belongs to it. Call [`Region::check`] first.
+    pub fn contains(&self, x: usize, y: usize) -> bool {
+        let (px, py) = (x as f64, y as f64);
+        match self {
+            Self::Rect(r) => x >= r.x && y >= r.y && x - r.x < r.width && y - r.y < r.height,
+            Self::Disc { centre, radius } => (px - centre.0).hypot(py - centre.1) <= *radius,
+            Self::Polygon(corners) => {
+                let before = corners.iter().cycle().skip(corners.len().saturating_sub(1));
+                let crosses = |(a, b): &(&(f64, f64), &(f64, f64))| {
+                    (a.1 > py) != (b.1 > py) && px < a.0 + (py - a.1) / (b.1 - a.1) * (b.0 - a.0)
+                };
+                corners.iter().zip(before).filter(crosses).count() % 2 == 1
+            }
+            Self::Mask(mask) => mask.data()[y * mask.width() + x],
+        }
     }
 }
 

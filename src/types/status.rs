@@ -2,7 +2,8 @@
 
 use super::choices;
 
-/// The state of one estimate. `Border`, `NonFinite`, `Masked` and `Unobservable` come with NaN values.
+/// The state of one estimate. `Border`, `NonFinite`, `Masked`, `Unobservable` and `MissingFrame` come with NaN
+/// values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 #[repr(u8)]
 pub enum Status {
@@ -27,6 +28,8 @@ pub enum Status {
     /// pixel is occluded in another frame, has changed, or moves differently; the covariance does not include
     /// this, and the estimate is not valid.
     Inconsistent = 8,
+    /// The sequence has no frame before or after this one that the estimate needs.
+    MissingFrame = 9,
 }
 
 choices!(Status:
@@ -39,6 +42,7 @@ choices!(Status:
     Repaired "repaired",
     Predicted "predicted",
     Inconsistent "inconsistent",
+    MissingFrame "missing_frame",
 );
 
 impl Status {

@@ -2,7 +2,7 @@
 
 use jacoflow::flow::advect;
 use jacoflow::math::random::CounterRng;
-use jacoflow::types::{FieldLayout, FlowField, MOTION_NAMES, Rect, SamplingGrid, Status};
+use jacoflow::types::{FieldLayout, FlowField, Interval, MOTION_NAMES, Rect, SamplingGrid, Status, Units};
 use proptest::prelude::*;
 
 const MOTION: [f64; 6] = [1.2, -0.7, 0.05, 0.04, -0.06, 0.03];
@@ -13,8 +13,8 @@ fn layout(sites: SamplingGrid, parameters: &[&str]) -> FieldLayout {
         sites,
         model: "affine".into(),
         parameters: parameters.iter().map(|name| (*name).to_string()).collect(),
-        frame_period: None,
-        pixel_pitch: (1.0, 1.0),
+        units: Units::default(),
+        interval: Interval::Instant,
         frame_index: 0,
         correlation_length: 0.0,
     }
@@ -141,11 +141,19 @@ fn between_sites_the_slopes_errors_count_too() {
 }
 
 #[test]
-fn fields_without_a_grid_or_in_other_units_are_refused() {
+fn fields_without_a_grid_are_refused() {
     let mut field = affine(SamplingGrid::Points(vec![(4, 5), (6, 7)]), &MOTION_NAMES);
     assert!(advect(&field, &[], None).unwrap_err().to_string().starts_with("field: "));
     field = affine(region(), &MOTION_NAMES);
     assert!(advect(&field, &[[5.0, 5.0]], Some(&[])).unwrap_err().to_string().starts_with("covariance: "));
-    field.layout.pixel_pitch = (0.5, 0.5);
-    assert!(advect(&field, &[], None).unwrap_err().to_string().starts_with("pixel_pitch: "));
+}
+
+#[test]
+fn fields_in_other_units_move_points_in_pixels() {
+    let field = affine(region(), &MOTION_NAMES);
+    let want = advect(&field, &[[5.25, 6.5]], None).unwrap().points[0];
+    let mut metric = field.clone();
+    metric.convert(Units::new((0.5, 0.25), Some("mm"), Some(0.04)));
+    let got = advect(&metric, &[[5.25, 6.5]], None).unwrap().points[0];
+    assert!((0..2).all(|c| (got[c] - want[c]).abs() < 1e-12), "{got:?} {want:?}");
 }

@@ -1,7 +1,7 @@
 //! How many estimates share one independent one.
 
 use jacoflow::flow::derived::sharing;
-use jacoflow::types::{FieldLayout, SamplingGrid};
+use jacoflow::types::{FieldLayout, Interval, SamplingGrid, Units};
 
 fn layout(sites: SamplingGrid, correlation_length: f64) -> FieldLayout {
     FieldLayout {
@@ -9,8 +9,8 @@ fn layout(sites: SamplingGrid, correlation_length: f64) -> FieldLayout {
         sites,
         model: "affine".into(),
         parameters: Vec::new(),
-        frame_period: None,
-        pixel_pitch: (1.0, 1.0),
+        units: Units::default(),
+        interval: Interval::Instant,
         frame_index: 0,
         correlation_length,
     }

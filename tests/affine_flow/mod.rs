@@ -407,15 +407,17 @@ fn other_models_run_through_the_same_door() {
 fn pixel_pitch_and_frame_period_scale_results_and_change_no_decision() {
     let frames = texture(10);
     let run = |pixel_pitch, covariance| {
-        let common =
-            EstimatorOptions { pixel_pitch, covariance, frame_period: Some(0.04), ..EstimatorOptions::default() };
+        let units = Units::new(pixel_pitch, None, Some(0.04));
+        let common = EstimatorOptions { units, covariance, ..EstimatorOptions::default() };
         estimator(InstantaneousOptions::default(), common).estimate(&three(&frames), 0).unwrap()
     };
     for covariance in [false, true] {
         let (px, mm) = (run((1.0, 1.0), covariance), run((0.5, 0.25), covariance));
         assert_eq!(px.status, mm.status);
-        assert_eq!((mm.layout.frame_period, mm.layout.pixel_pitch), (Some(0.04), (0.5, 0.25)));
+        assert_eq!(mm.layout.units, Units::new((0.5, 0.25), None, Some(0.04)));
         let i = 25 * 60 + 30;
+        let frames = mm.in_pixels_and_frames();
+        assert!((frames.affine(i).u - px.affine(i).u * 0.04).abs() < 1e-12);
         let (a, b) = (px.affine(i).to_array(), mm.affine(i).to_array());
         let scale = [0.5, 0.25, 1.0, 0.5, 2.0, 1.0];
         for k in 0..6 {

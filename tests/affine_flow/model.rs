@@ -19,9 +19,14 @@ fn names_round_trip_and_neither_assumption_is_refused_with_its_reason() {
 }
 
 #[test]
-fn parameters_scale_with_the_pixel_pitch() {
-    let scales: Vec<f64> = ModelKind::Affine.parameters().iter().map(|p| p.scale((2.0, 0.5))).collect();
-    assert_eq!(scales, [2.0, 0.5, 1.0, 0.25, 4.0, 1.0]);
+fn parameters_scale_with_the_pixel_pitch_and_the_period() {
+    let scales = |model: ModelKind, period| -> Vec<f64> {
+        let units = Units::new((2.0, 0.5), None, period);
+        model.parameters().iter().map(|parameter| units.scale(parameter.name)).collect()
+    };
+    assert_eq!(scales(ModelKind::Affine, None), [2.0, 0.5, 1.0, 0.25, 4.0, 1.0]);
+    assert_eq!(scales(ModelKind::Affine, Some(0.5)), [4.0, 1.0, 2.0, 0.5, 8.0, 2.0]);
+    assert_eq!(scales(ModelKind::Accelerating, Some(0.5)), [4.0, 1.0, 8.0, 2.0]);
 }
 
 /// One of the tests below, for a model that is chosen at run time.

@@ -1,6 +1,6 @@
 //! The result of an estimator: planes of motion parameters, their covariance and their status.
 
-use jacoflow::types::{FieldLayout, FlowField, SamplingGrid};
+use jacoflow::types::{FieldLayout, FlowField, Interval, SamplingGrid, Units};
 
 #[test]
 fn planes_are_found_by_name_and_missing_parameters_are_zero() {
@@ -9,8 +9,8 @@ fn planes_are_found_by_name_and_missing_parameters_are_zero() {
         sites: SamplingGrid::default(),
         model: "translational".into(),
         parameters: vec!["u".into(), "v".into()],
-        frame_period: None,
-        pixel_pitch: (1.0, 1.0),
+        units: Units::default(),
+        interval: Interval::Instant,
         frame_index: 1,
         correlation_length: 0.0,
     };

@@ -1,6 +1,6 @@
 //! A field for the writers to write.
 
-use jacoflow::types::{FieldLayout, FlowField, SamplingGrid, Status};
+use jacoflow::types::{FieldLayout, FlowField, Interval, SamplingGrid, Status, Units};
 
 /// A field with a distinct number everywhere and every optional plane.
 pub fn numbered(sites: SamplingGrid) -> FlowField<f32> {
@@ -9,8 +9,8 @@ pub fn numbered(sites: SamplingGrid) -> FlowField<f32> {
         sites,
         model: "affine".into(),
         parameters: jacoflow::types::MOTION_NAMES.map(String::from).to_vec(),
-        frame_period: Some(0.04),
-        pixel_pitch: (1.0, 1.0),
+        units: Units::new((1.0, 1.0), None, Some(0.04)),
+        interval: Interval::Instant,
         frame_index: 3,
         correlation_length: 0.0,
     };

@@ -1,7 +1,7 @@
 //! Flow as a dense pair of planes in px/frame: what the exchange formats hold.
 
 use jacoflow::io::FlowImage;
-use jacoflow::types::{FieldLayout, FlowField, SamplingGrid, Status};
+use jacoflow::types::{FieldLayout, FlowField, Interval, SamplingGrid, Status, Units};
 
 fn field(sites: SamplingGrid) -> FlowField<f64> {
     let layout = FieldLayout {
@@ -9,8 +9,8 @@ fn field(sites: SamplingGrid) -> FlowField<f64> {
         sites,
         model: "affine".into(),
         parameters: jacoflow::types::MOTION_NAMES.map(String::from).to_vec(),
-        frame_period: None,
-        pixel_pitch: (0.5, 0.25),
+        units: Units::new((0.5, 0.25), None, None),
+        interval: Interval::Forward,
         frame_index: 0,
         correlation_length: 0.0,
     };

@@ -25,7 +25,7 @@ mod statuses;
 mod time_to_contact;
 
 // The scenes name them by their place in the crate, whose unit tests share them.
-use jacoflow::types::{FieldLayout, FlowField, MOTION_NAMES, SamplingGrid};
+use jacoflow::types::{FieldLayout, FlowField, Interval, MOTION_NAMES, SamplingGrid, Units};
 use jacoflow::{math, motion3d};
 use math::Real;
 use math::random::CounterRng;
@@ -47,8 +47,8 @@ fn empty_field<T: Real>(frame_size: (usize, usize), stride: usize, length: f64) 
         sites: SamplingGrid::Grid { region: None, stride },
         model: "affine".into(),
         parameters: MOTION_NAMES.map(String::from).to_vec(),
-        frame_period: None,
-        pixel_pitch: (1.0, 1.0),
+        units: Units::default(),
+        interval: Interval::Instant,
         frame_index: 0,
         correlation_length: length,
     };

@@ -4,7 +4,7 @@ use jacoflow::error::{Error, Result};
 use jacoflow::io::{FrameSource, MemorySource};
 use jacoflow::parallel::{Progress, Silent};
 use jacoflow::pipeline::{Collect, Ending, FieldSink, Numbering, Output, Pipeline, Sink, Stage, Step};
-use jacoflow::types::{AnyFrame, FieldLayout, FlowField, Frame, SamplingGrid, Status};
+use jacoflow::types::{AnyFrame, FieldLayout, FlowField, Frame, Interval, SamplingGrid, Status, Units};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 
@@ -23,8 +23,8 @@ impl Stage<f32> for Means {
             sites: SamplingGrid::default(),
             model: "translational".into(),
             parameters: vec!["u".into(), "v".into()],
-            frame_period: None,
-            pixel_pitch: (1.0, 1.0),
+            units: Units::default(),
+            interval: Interval::Instant,
             frame_index: self.0 - 1,
             correlation_length: 0.0,
         };

@@ -42,14 +42,14 @@ def test_slopes_are_near_the_noise_bound_of_the_windows_they_rest_on(name):
 
 def test_windows_follow_the_flow(tmp_path):
     """They are wider for slower waves, a diagnostic that is told when asked for, and go to files."""
-    slow, quick = (jacoflow.estimate([controlled.frame(controlled.Case(wave, 2.0, 3.0), t) for t in (0.0, 1.0)], diagnostics=True) for wave in (256.0, 64.0))
+    slow, quick = (jacoflow.flow(*[controlled.frame(controlled.Case(wave, 2.0, 3.0), t) for t in (0.0, 1.0)], diagnostics=True) for wave in (256.0, 64.0))
     assert np.median(slow.window) > 2 * np.median(quick.window) > 10.0
     assert 1.7 <= quick.window.min() and slow.window.max() <= 27.0 + 1e-4
     slow.save(tmp_path / "slow.npz")
     np.testing.assert_array_equal(jacoflow.FlowField.load(tmp_path / "slow.npz").window, slow.window)
-    part = jacoflow.estimate([controlled.frame(controlled.Case(64.0, 2.0, 3.0), t) for t in (0.0, 1.0)], diagnostics=True, grid=jacoflow.SamplingGrid(points=[[40, 30]]))
+    part = jacoflow.flow(*[controlled.frame(controlled.Case(64.0, 2.0, 3.0), t) for t in (0.0, 1.0)], diagnostics=True, grid=jacoflow.SamplingGrid(points=[[40, 30]]))
     assert part.window[0] == quick.window[30, 40]
-    assert jacoflow.estimate([controlled.frame(controlled.Case(64.0, 2.0, 3.0), t) for t in (0.0, 1.0)]).window is None
+    assert jacoflow.flow(*[controlled.frame(controlled.Case(64.0, 2.0, 3.0), t) for t in (0.0, 1.0)]).window is None
 
 
 def test_two_frames_are_limited_by_noise():
@@ -66,5 +66,5 @@ def test_small_frames_find_motion_of_a_tenth_of_their_side(size):
     shift, rng = 16, np.random.default_rng(4)
     texture = gaussian_filter(rng.standard_normal((size[0], size[1] + shift)), 2)
     texture = 128 + 40 * texture / texture.std()
-    field = jacoflow.estimate([texture[:, shift:], texture[:, :-shift]], method=jacoflow.CoarseToFine(time_scheme="pair"))
+    field = jacoflow.flow(texture[:, shift:], texture[:, :-shift], method=jacoflow.CoarseToFine(time_scheme="pair"))
     assert np.abs(field.u - shift)[8:-8, 8 : -2 * shift].mean() < 0.02

@@ -25,7 +25,7 @@ def truth():
 def estimated():
     """An estimate with covariance, and the stack (T = 4) of a longer sequence."""
     frames = scene(random_state=4).frames(6)
-    return jacoflow.estimate(list(frames[:3]), method="windowed"), jacoflow.estimate(frames, method="windowed")
+    return jacoflow.flow(*frames[:3], method="windowed"), jacoflow.estimate(frames, method="windowed", ends="drop")
 
 
 @pytest.fixture
@@ -51,10 +51,10 @@ def test_a_site_moves_by_its_own_flow(estimated):
 def test_between_sites_of_a_coarse_grid_the_jacobian_counts():
     """A field on every fourth pixel is as exact for affine motion as a dense one; the bilinear mean of a curved one is not."""
     frames = list(scene(random_state=4).frames(3))
-    coarse = jacoflow.estimate(frames, method="windowed", grid=jacoflow.SamplingGrid(stride=4, region=(4, 4, 29, 25)))
+    coarse = jacoflow.flow(*frames, method="windowed", grid=jacoflow.SamplingGrid(stride=4, region=(4, 4, 29, 25)))
     assert np.isfinite(coarse.advect([[5.0, 5.5], [32.0, 28.0]])).all()
     assert np.isnan(coarse.advect([[3.9, 5.5], [32.1, 20.0], [20.0, 28.1]])).all()
-    dense = jacoflow.estimate(frames, method="windowed")
+    dense = jacoflow.flow(*frames, method="windowed")
     place = [[17.3, 14.8]]
     assert_allclose(coarse.advect(place), dense.advect(place), atol=0.02)
 
@@ -77,7 +77,7 @@ def test_covariance_against_monte_carlo(estimated):
 
 def test_a_model_without_derivatives_takes_the_slope_of_the_flow():
     frames = list(scene(random_state=4).frames(2))
-    field = jacoflow.estimate(frames, method="lucas_kanade")
+    field = jacoflow.flow(*frames, method="lucas_kanade")
     _, spread = field.advect([[20.25, 16.5]], np.eye(2))
     moved = [field.advect([[20.25 + dx, 16.5 + dy]])[0] for dx, dy in ((0.01, 0), (-0.01, 0), (0, 0.01), (0, -0.01))]
     step = np.column_stack([(moved[0] - moved[1]) / 0.02, (moved[2] - moved[3]) / 0.02])
@@ -103,7 +103,7 @@ def test_a_stack_carries_points_through_all_its_fields(estimated, points):
 
 
 def test_what_left_the_field_stays_unknown():
-    field = jacoflow.estimate(scene(random_state=4).frames(5), method="windowed")
+    field = jacoflow.estimate(scene(random_state=4).frames(5), method="windowed", ends="drop")
     path = field.advect([[38.9, 30.9], [np.nan, 4.0], [-5.0, 4.0]])
     assert np.isnan(path[1:, 1:]).all() and np.isnan(path[-1]).any()
 
@@ -144,9 +144,9 @@ def test_mistakes_are_named(truth, arguments, error, message):
 
 
 def test_only_grids_in_pixels(texture):
-    listed = jacoflow.estimate(list(texture), method="windowed", grid=jacoflow.SamplingGrid(points=[(10, 10), (20, 20)]))
+    listed = jacoflow.flow(*texture, method="windowed", grid=jacoflow.SamplingGrid(points=[(10, 10), (20, 20)]))
     with pytest.raises(ValueError, match="field: expected one on a grid of pixels.*2 points"):
         listed.advect([[10.0, 10.0]])
-    scaled = jacoflow.estimate(list(texture), method="windowed", pixel_pitch=0.5)
+    scaled = jacoflow.flow(*texture, method="windowed", pixel_pitch=0.5)
     with pytest.raises(ValueError, match=r"pixel_pitch: expected 1.*\(0.5, 0.5\)"):
         scaled.advect([[10.0, 10.0]])

@@ -14,7 +14,7 @@ BARS = {"balanced": 0.5, "accurate": 0.49}
 def test_flow_beside_a_boundary_and_its_uncertainty(preset):
     for seed in (7, 8):
         frames, flow, near = layered(seed)
-        field = jacoflow.estimate(frames, method=jacoflow.CoarseToFine(preset=preset))
+        field = jacoflow.flow(*frames, method=jacoflow.CoarseToFine(preset=preset))
         error = np.asarray(field.flow) - flow
         distance = np.linalg.norm(error, axis=-1)
         std = np.stack([field.std("u"), field.std("v")], axis=-1)

@@ -9,7 +9,7 @@ from benchmarks.scenes import disturbed as scenes
 
 def errors(frames, shift, **options):
     """Root-mean-square error of the flow, px, and share of 95 % intervals that hold."""
-    field = jacoflow.estimate(frames, **options)
+    field = jacoflow.flow(*frames, **options)
     error = scenes.inner(field.flow - np.array(shift))
     std = scenes.inner(np.stack([field.std("u"), field.std("v")], axis=-1))
     return float(np.sqrt(np.mean(np.sum(error**2, axis=-1)))), float(np.mean(np.abs(error) <= 1.96 * std))
@@ -43,29 +43,29 @@ def test_noise_that_is_given_grows_with_the_gain_that_is_removed():
     that standard deviations are proportional to it, and above the other errors."""
     picture = 110 + 22 * scenes.texture(16)
     views = [scenes.view(picture, (0, 0)), scenes.view(picture, (0.4, 0.2))]
-    equal = jacoflow.estimate([scenes.noisy(frame, n) for n, frame in enumerate(views)], noise=1.0)
+    equal = jacoflow.flow(*[scenes.noisy(frame, n) for n, frame in enumerate(views)], noise=1.0)
     darker = [scenes.noisy(gain * frame, n) for n, (gain, frame) in enumerate(zip((1, 0.5), views, strict=True))]
-    ratio = np.median(jacoflow.estimate(darker, noise=1.0).std("u") / equal.std("u"))
+    ratio = np.median(jacoflow.flow(*darker, noise=1.0).std("u") / equal.std("u"))
     assert 1.3 < ratio < 1.7
 
 
 def test_equal_frames_are_taken_as_they_are():
     """Motion alone is no change of brightness: a constant added to both frames changes nothing."""
     pair = scenes.changed_pair(15, (4.0, 1.5))
-    plain = jacoflow.estimate(pair).flow
-    brighter = jacoflow.estimate([frame + 30 for frame in pair]).flow
+    plain = jacoflow.flow(*pair).flow
+    brighter = jacoflow.flow(*[frame + 30 for frame in pair]).flow
     np.testing.assert_allclose(plain, brighter, atol=1e-4)
 
 
 def test_a_few_saturated_pixels_change_nothing_elsewhere():
     for seed in range(3):
         clean, spoilt, far = scenes.specks(seed)
-        one, other = jacoflow.estimate(clean), jacoflow.estimate(spoilt)
+        one, other = jacoflow.flow(*clean), jacoflow.flow(*spoilt)
         std = np.stack([one.std("u"), one.std("v")], axis=-1)
         assert np.mean((np.abs(other.flow - one.flow) > 0.1 * std)[far]) < 0.05, seed
 
 
 @pytest.mark.parametrize("shift", [(56, 0), (0, -64), (80, 60)])
 def test_shifts_of_up_to_100_px_are_found(shift):
-    field = jacoflow.estimate(scenes.shifted_speckle(7, shift))
+    field = jacoflow.flow(*scenes.shifted_speckle(7, shift))
     assert np.quantile(np.linalg.norm(field.flow - np.array(shift), axis=-1)[scenes.FOUND], 0.99) < 0.05

@@ -38,7 +38,7 @@ def test_errors_lie_within_their_deviations(name, carrier, noise, method, seeds,
         scene = scenes.Scene(name, width=112, height=96, random_state=seed, carrier=carrier)
         # To the next frame, or at the middle one.
         truth = scene.truth(0.0, between=(0.0, 1.0)) if method == "coarse_to_fine" else scene.truth(0.0)
-        field = jacoflow.estimate(camera_frames(scene, noise, seed), method=method)
+        field = jacoflow.flow(*camera_frames(scene, noise, seed), method=method)
         known = inner(field, truth)
         assert known.sum() > 0.99 * (112 - 2 * MARGIN) * (96 - 2 * MARGIN)
         for parameter in (*field.parameters, "divergence", "curl"):
@@ -52,10 +52,10 @@ def test_errors_lie_within_their_deviations(name, carrier, noise, method, seeds,
 def test_the_default_beats_the_baselines(name, carrier):
     scene = scenes.Scene(name, width=112, height=96, random_state=3, carrier=carrier)
     frames, truth = camera_frames(scene, 1.0, 1), scene.truth(0.0, between=(0.0, 1.0))
-    ours = jacoflow.estimate(frames)
+    ours = jacoflow.flow(*frames)
     known = inner(ours, truth)
     for method in ("lucas_kanade", "horn_schunck"):
-        other = jacoflow.estimate(frames, method=method)
+        other = jacoflow.flow(*frames, method=method)
         assert flow_error(ours, truth, known) < flow_error(other, truth, known & other.valid), method
 
 
@@ -63,7 +63,7 @@ def test_the_default_beats_the_baselines(name, carrier):
 def test_the_flow_is_not_drawn_to_zero(carrier):
     """Slope of the estimate over the truth, on a vortex seen in 8 bits."""
     scene = scenes.Scene("vortex", width=112, height=96, random_state=5, carrier=carrier)
-    field, truth = jacoflow.estimate(camera_frames(scene, 1.0, 1)), scene.truth(0.0, between=(0.0, 1.0))
+    field, truth = jacoflow.flow(*camera_frames(scene, 1.0, 1)), scene.truth(0.0, between=(0.0, 1.0))
     known = inner(field, truth)
     slope = np.sum((field.flow * truth.flow)[known]) / np.sum(truth.flow[known] ** 2)
     assert abs(slope - 1) < 0.05
@@ -89,7 +89,7 @@ def test_intervals_of_the_coarse_to_fine_estimate_hold_the_truth(carrier, frames
         camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=seed)
         pictures = [camera.apply_u8(scene.frame(t), index) for index, t in enumerate(times)]
         truth = scene.truth(0.0, between=(0.0, 1.0))
-        field = jacoflow.estimate(pictures, method=jacoflow.CoarseToFine(time_scheme="pair" if frames == 2 else None))
+        field = jacoflow.flow(*pictures, method=jacoflow.CoarseToFine(time_scheme="pair" if frames == 2 else None))
         inside = np.s_[16:-16, 16:-16]
         for name, shares in held.items():
             error = np.abs(field.value(name) - truth.value(name))[inside]
@@ -110,7 +110,7 @@ def test_what_leaves_the_frame_has_wide_intervals(frames):
         camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, random_state=seed)
         pictures = [camera.apply_u8(scene.frame(t), index) for index, t in enumerate(times)]
         truth = scene.truth(0.0, between=(0.0, 1.0))
-        field = jacoflow.estimate(pictures, method=jacoflow.CoarseToFine(time_scheme="pair" if frames == 2 else None))
+        field = jacoflow.flow(*pictures, method=jacoflow.CoarseToFine(time_scheme="pair" if frames == 2 else None))
         columns, rows = np.meshgrid(np.arange(176), np.arange(160))
         ways = [truth.flow, -truth.flow] if frames == 3 else [truth.flow]
         seen = np.logical_and.reduce([(columns + w[..., 0] >= 0) & (columns + w[..., 0] <= 175) & (rows + w[..., 1] >= 0) & (rows + w[..., 1] <= 159) for w in ways])
@@ -126,8 +126,8 @@ def test_deviations_of_mirrored_frames_are_mirrored(size):
     """All four sides are told the same, whatever the size is a multiple of."""
     scene = scenes.Scene("turbulence", width=size[0], height=size[1], random_state=2, carrier="noise", speed=2.0, longest=192.0)
     frames = [np.round(scene.frame(t)).astype(np.float32) for t in (0.0, 1.0)]
-    deviations = jacoflow.estimate(frames, method=jacoflow.CoarseToFine(time_scheme="pair")).std("u")
-    mirrored = jacoflow.estimate([np.ascontiguousarray(frame[::-1, ::-1]) for frame in frames], method=jacoflow.CoarseToFine(time_scheme="pair")).std("u")[::-1, ::-1]
+    deviations = jacoflow.flow(*frames, method=jacoflow.CoarseToFine(time_scheme="pair")).std("u")
+    mirrored = jacoflow.flow(*[np.ascontiguousarray(frame[::-1, ::-1]) for frame in frames], method=jacoflow.CoarseToFine(time_scheme="pair")).std("u")[::-1, ::-1]
     sides = [np.s_[:2], np.s_[-2:], np.s_[:, :2], np.s_[:, -2:]]
     for side in sides:
         # SamplingGrid are every second pixel, so that the estimates themselves differ at an edge.
@@ -144,7 +144,7 @@ def test_the_covariance_is_positive_definite_and_grows_with_noise_and_without_te
     deviations = []
     for noise in (1.0, 4.0):
         frames = [128 + (frame - 128) * fade + rng.normal(0, noise, frame.shape) for frame in clean]
-        field = jacoflow.estimate(frames, method=jacoflow.CoarseToFine(time_scheme="pair"))
+        field = jacoflow.flow(*frames, method=jacoflow.CoarseToFine(time_scheme="pair"))
         scale = np.sqrt(np.einsum("...ii->...i", field.covariance))
         correlation = field.covariance / scale[..., :, None] / scale[..., None, :]
         assert np.linalg.eigvalsh(correlation).min() > 1e-3
@@ -187,7 +187,7 @@ def test_what_coarse_levels_leave_beneath_areas_without_texture_is_reported(pres
             u, v = 1.7 + 0.6 * seed, -0.9 + 0.5 * seed
             second = map_coordinates(first, [y - v, x - u], order=3, mode="wrap")
             pair = [np.clip(np.rint(frame + rng.standard_normal(x.shape)), 0, 255).astype(np.uint8) for frame in (first, second)]
-            field = jacoflow.estimate(pair, method=jacoflow.CoarseToFine(preset=preset))
+            field = jacoflow.flow(*pair, method=jacoflow.CoarseToFine(preset=preset))
             errors = {"u": field.u - u, "v": field.v - v, "divergence": field.divergence, "curl": field.curl}
             held = np.array([abs(error) < 1.96 * field.std(name) for name, error in errors.items()])[:, 16:-16, 16:-16]
             beyond_edge = beyond[16:-16, 16:-16]
@@ -216,7 +216,7 @@ def test_texture_of_one_direction_shows_motion_across_it_and_not_along_it(preset
         u, v = 1.7, -0.9 + 0.5 * seed
         sequences = [map_coordinates(scene, [y - k * v, x - k * u], order=3, mode="wrap") for k in range(2 - frames, 2)]
         sequence = [np.clip(np.rint(frame + rng.standard_normal(x.shape)), 0, 255).astype(np.uint8) for frame in sequences]
-        field = jacoflow.estimate(sequence, method=jacoflow.CoarseToFine(preset=preset))
+        field = jacoflow.flow(*sequence, method=jacoflow.CoarseToFine(preset=preset))
         for found, name, truth in ((across, "u", u), (along, "v", v)):
             error, told = (field.value(name) - truth)[area], field.std(name)[area]
             found.append((np.mean(abs(error) < 1.96 * told), np.sqrt(np.mean(error**2)), np.median(told)))
@@ -247,7 +247,7 @@ def test_areas_without_texture_are_reported_as_uncertain_as_they_are(preset, lea
         first = 128 + 40 * smooth / smooth.std() * (1 - flat)
         second = map_coordinates(first, [y, start], order=3, mode="wrap")
         pair = [np.clip(np.rint(frame + rng.standard_normal(x.shape)), 0, 255).astype(np.uint8) for frame in (first, second)]
-        field = jacoflow.estimate(pair, method=jacoflow.CoarseToFine(preset=preset))
+        field = jacoflow.flow(*pair, method=jacoflow.CoarseToFine(preset=preset))
         inside, outside = distance < 21, (distance > 40) & (distance < 80)
         shares.append(np.mean((abs(field.u - along(x)) < 1.96 * field.std("u"))[inside]))
         wider.append(np.median(field.std("u")[inside]) / np.median(field.std("u")[outside]))

@@ -43,4 +43,4 @@ def test_flow_equals_the_python_call(tmp_path):
     assert result.returncode == 0, result.stderr
     json.loads(result.stdout)
     field = jacoflow.FlowField.load(tmp_path / "field.npz")
-    np.testing.assert_array_equal(field.flow, jacoflow.estimate(list(frames)).flow)
+    np.testing.assert_array_equal(field.flow, jacoflow.flow(*frames).flow)

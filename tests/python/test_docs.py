@@ -125,7 +125,7 @@ def test_links_of_pages_lead_somewhere(page):
 def test_defaults_are_the_cores(tmp_path):
     """What the signature promises as a default gives the same as leaving it to the core."""
     frames = list(jacoflow.scenes.Scene("affine", width=32, height=32).frames(3))
-    plain = jacoflow.estimate(frames, method="windowed")
-    told = jacoflow.estimate(frames, method=jacoflow.Windowed(time_scheme="central", neighbourhood=(3, 3), window_sigma=4.0), preprocess=jacoflow.Preprocess(colour="error"), grid=jacoflow.SamplingGrid(stride=1), precision="float64", pixel_pitch=1.0)
+    plain = jacoflow.flow(*frames, method="windowed")
+    told = jacoflow.flow(*frames, method=jacoflow.Windowed(time_scheme="central", neighbourhood=(3, 3), window_sigma=4.0), preprocess=jacoflow.Preprocess(colour="error"), grid=jacoflow.SamplingGrid(stride=1), precision="float64", pixel_pitch=1.0)
     assert (plain.flow == told.flow)[plain.valid].all()
     assert pytest.approx(plain.covariance[16, 16]) == told.covariance[16, 16]

@@ -158,7 +158,7 @@ def test_small_and_odd_frames_of_a_stream():
 
 def test_flat_frames_are_no_error():
     for method in ("windowed", "instantaneous", "lucas_kanade", "horn_schunck"):
-        field = jacoflow.estimate([np.full((48, 48), 7, np.uint8)] * 3, method=method)
+        field = jacoflow.flow(*([np.full((48, 48), 7, np.uint8)] * 3), method=method)
         if method != "horn_schunck":
             assert not field.valid.any() and np.isnan(field.flow).all()
             assert (field.status[20:-20, 20:-20] == jacoflow.Status.UNOBSERVABLE).all()
@@ -168,8 +168,8 @@ def test_sixteen_bit_extremes_do_not_overflow():
     frames = np.clip(scenes.Scene("affine", width=48, height=48).frames(3) / 255, 0, 1)
     wide = np.round(frames * 65535).astype(np.uint16)
     assert wide.max() > 60000
-    narrow = jacoflow.estimate(list(frames))
-    full = jacoflow.estimate(list(wide))
+    narrow = jacoflow.flow(*frames)
+    full = jacoflow.flow(*wide)
     np.testing.assert_allclose(full.flow[10:-10, 10:-10], narrow.flow[10:-10, 10:-10], atol=2e-3)
 
 
@@ -228,9 +228,9 @@ def test_a_useless_environment_is_named_unless_an_option_overrides_it(monkeypatc
         jacoflow.estimate(frames)
     with pytest.raises(ValueError, match=message):
         FlowFilter().push(frames[0])
-    jacoflow.estimate(frames, threads=1, simd="scalar")
+    jacoflow.flow(*frames, threads=1, simd="scalar")
     monkeypatch.setenv(f"JACOFLOW_{variable}", "")
-    jacoflow.estimate(frames)
+    jacoflow.flow(*frames)
 
 
 @pytest.mark.parametrize("name", ["stride", "threads", "iterations"])
@@ -255,7 +255,7 @@ def test_options_are_named_as_the_user_wrote_them():
         assert len(str(error.value)) < 400
     with pytest.raises(TypeError, match="^region: expected four integers"):
         jacoflow.estimate(frames, grid=jacoflow.SamplingGrid(region="abcd"))
-    field = jacoflow.estimate(frames)[0]
+    field = jacoflow.estimate(frames, ends="drop")[0]
     with pytest.raises(ValueError, match="^region: "):
         field.region_mean("curl", (0, 0, 600, 5))
 
@@ -276,7 +276,7 @@ def test_noise_that_no_covariance_can_hold_is_refused(method):
     frames = [(120 + 40 * np.sin(0.4 * (x - t)) * np.cos(0.3 * y)).astype(np.float32) for t in range(3)]
     with pytest.raises(ValueError, match="noise: expected"):
         jacoflow.estimate(frames, noise=1e30, method=method)
-    field = jacoflow.estimate(frames, noise=1e12, method=method)
+    field = jacoflow.flow(*frames, noise=1e12, method=method)
     assert field.valid.any() and np.isfinite(field.covariance[field.valid]).all()
 
 

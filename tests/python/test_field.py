@@ -22,7 +22,7 @@ NAMES = ("u", "v", "u_x", "v_x", "u_y", "v_y")
 
 @pytest.fixture(scope="module")
 def field():
-    return jacoflow.estimate(list(scenes.Scene("affine", width=56, height=48, random_state=2).frames(3)), diagnostics=True)
+    return jacoflow.flow(*scenes.Scene("affine", width=56, height=48, random_state=2).frames(3), diagnostics=True)
 
 
 def test_shapes_and_kinds(field):
@@ -74,7 +74,7 @@ def test_parameters_have_values_and_spread_too(field):
 
 def test_rotation_centre():
     frames = scenes.Scene("ramp", width=40, height=40, origin=(10, 20)).frames(3)
-    field = jacoflow.estimate(list(frames), method="instantaneous", fps=100.0)
+    field = jacoflow.flow(*frames, method="instantaneous", fps=100.0)
     inside = (slice(2, -2), slice(2, -2))
     assert_allclose(field.rotation_centre[inside], np.broadcast_to([-10.0, -20.0], (36, 36, 2)), atol=1e-3)
     assert_allclose(field.rpm[inside], 100 * 60 / 200, rtol=1e-4)
@@ -97,7 +97,7 @@ def test_the_deviation_of_a_regions_mean_holds_its_error(count, smooth, least):
         for seed in range(12):
             camera = scenes.Sensor(noise=3.0, random_state=seed)
             frames = [camera.apply(frame, index) for index, frame in enumerate(clean)][3 - count :]
-            seen = jacoflow.estimate(frames, preprocess=jacoflow.Preprocess(smooth=smooth))
+            seen = jacoflow.flow(*frames, preprocess=jacoflow.Preprocess(smooth=smooth))
             for name in ("divergence", "curl"):
                 value, std, sites = seen.region_mean(name, (16, 16, 40, 40))
                 assert sites == 1600
@@ -114,7 +114,7 @@ def test_the_deviation_of_a_regions_mean_holds_the_bias_of_clean_frames(name):
     for seed in range(4):
         scene = scenes.Scene(name, width=96, height=96, random_state=seed)
         camera = scenes.Sensor(noise=0.0, rounding="nearest", saturate=True)
-        seen = jacoflow.estimate([camera.apply_u8(scene.frame(t), index=k) for k, t in enumerate((-1.0, 0.0, 1.0))])
+        seen = jacoflow.flow(*[camera.apply_u8(scene.frame(t), index=k) for k, t in enumerate((-1.0, 0.0, 1.0))])
         truth = scene.truth(0.0, between=(0.0, 1.0))
         value, std, _ = seen.region_mean("divergence", (16, 16, 64, 64))
         ratios.append((value - truth.value("divergence")[48, 48]) / std)
@@ -136,7 +136,7 @@ def test_what_cannot_be_asked(field):
         field.value("beauty")
     with pytest.raises(ValueError, match="quantity: |frame period|fps"):
         field.rpm  # noqa: B018
-    bare = jacoflow.estimate(list(scenes.Scene("affine", width=32, height=32).frames(3)), covariance=False)
+    bare = jacoflow.flow(*scenes.Scene("affine", width=32, height=32).frames(3), covariance=False)
     assert bare.covariance is None and bare.residual is None and bare.rank is None
     with pytest.raises(ValueError, match="covariance=True"):
         bare.std("u")
@@ -148,8 +148,8 @@ def test_what_cannot_be_asked(field):
 
 def test_frame_rate_and_pixel_pitch_scale_results():
     frames = list(scenes.Scene("affine", width=48, height=48).frames(3))
-    plain = jacoflow.estimate(frames)
-    scaled = jacoflow.estimate(frames, fps=1 / 0.5, pixel_pitch=(2.0, 4.0))
+    plain = jacoflow.flow(*frames)
+    scaled = jacoflow.flow(*frames, fps=1 / 0.5, pixel_pitch=(2.0, 4.0))
     inside = plain.valid
     assert_allclose(scaled.u[inside], 2 * plain.u[inside], rtol=1e-9)
     assert_allclose(scaled.v[inside], 4 * plain.v[inside], rtol=1e-9)
@@ -162,20 +162,20 @@ def test_frame_rate_and_pixel_pitch_scale_results():
 @pytest.mark.parametrize("method", ["windowed", "instantaneous"])
 def test_points_regions_and_strides_are_parts_of_the_whole(method):
     frames = list(scenes.Scene("affine", width=48, height=40).frames(3))
-    whole = jacoflow.estimate(frames, method=method)
+    whole = jacoflow.flow(*frames, method=method)
     pixels = np.array([[5, 4], [20, 30], [47, 39], [0, 0]])
-    points = jacoflow.estimate(frames, method=method, grid=jacoflow.SamplingGrid(points=pixels))
+    points = jacoflow.flow(*frames, method=method, grid=jacoflow.SamplingGrid(points=pixels))
     assert points.shape == (4,) and points.flow.shape == (4, 2) and points.covariance.shape == (4, 6, 6)
     assert_array_equal(points.points, pixels)
-    region = jacoflow.estimate(frames, method=method, grid=jacoflow.SamplingGrid(region=(10, 6, 20, 12)))
-    strided = jacoflow.estimate(frames, method=method, grid=jacoflow.SamplingGrid(stride=4))
-    strided_region = jacoflow.estimate(frames, method=method, grid=jacoflow.SamplingGrid(region=(3, 2, 30, 21), stride=5))
+    region = jacoflow.flow(*frames, method=method, grid=jacoflow.SamplingGrid(region=(10, 6, 20, 12)))
+    strided = jacoflow.flow(*frames, method=method, grid=jacoflow.SamplingGrid(stride=4))
+    strided_region = jacoflow.flow(*frames, method=method, grid=jacoflow.SamplingGrid(region=(3, 2, 30, 21), stride=5))
     for part in (points, region, strided, strided_region):
         x, y = part.points[..., 0], part.points[..., 1]
         assert_array_equal(part.status, whole.status[y, x])
         assert_allclose(part.flow, whole.flow[y, x], rtol=1e-6, atol=1e-9)
     assert region.shape == (12, 20) and strided.shape == (10, 12) and strided_region.shape == (5, 6)
-    none = jacoflow.estimate(frames, method=method, grid=jacoflow.SamplingGrid(points=np.zeros((0, 2), int)))
+    none = jacoflow.flow(*frames, method=method, grid=jacoflow.SamplingGrid(points=np.zeros((0, 2), int)))
     assert none.shape == (0,) and none.flow.shape == (0, 2) and none.divergence.shape == (0,)
 
 
@@ -184,25 +184,25 @@ def test_masked_pixels_say_so():
     mask = np.ones((48, 48), bool)
     mask[20:30, 20:30] = False
     for method in ("windowed", "instantaneous"):
-        field = jacoflow.estimate(frames, method=method, mask=mask)
+        field = jacoflow.flow(*frames, method=method, mask=mask)
         assert (field.status[22:28, 22:28] == Status.MASKED).all()
         assert np.isnan(field.flow[22:28, 22:28]).all()
 
 
 def test_other_models_leave_derivatives_zero():
     frames = list(scenes.Scene("affine", width=40, height=40, u_x=0, v_x=0, u_y=0, v_y=0).frames(3))
-    field = jacoflow.estimate(frames, method=jacoflow.Instantaneous(model="translational", neighbourhood=(5, 5)))
+    field = jacoflow.flow(*frames, method=jacoflow.Instantaneous(model="translational", neighbourhood=(5, 5)))
     assert field.parameters == ("u", "v") and field.model == "translational"
     assert (field.jacobian[field.valid] == 0).all() and np.isnan(field.jacobian[~field.valid]).all()
     assert field.covariance.shape == (40, 40, 6, 6)
-    accelerating = jacoflow.estimate(frames, method=jacoflow.Instantaneous(model="accelerating", neighbourhood=(5, 5)))
+    accelerating = jacoflow.flow(*frames, method=jacoflow.Instantaneous(model="accelerating", neighbourhood=(5, 5)))
     assert accelerating.parameters[2:] == ("u_t", "v_t")
     assert accelerating.value("u_t").shape == accelerating.std("v_t").shape == (40, 40)
 
 
 def test_minimum_norm_is_marked():
     frames = list(np.tile(np.arange(20.0), (3, 20, 1)))
-    field = jacoflow.estimate(frames, method=jacoflow.Instantaneous(rank_deficient="min_norm"))
+    field = jacoflow.flow(*frames, method=jacoflow.Instantaneous(rank_deficient="min_norm"))
     assert (field.status[2:-2, 2:-2] == Status.MIN_NORM).all()
     assert np.isfinite(field.flow[2:-2, 2:-2]).all() and not field.valid.any()
 
@@ -227,19 +227,19 @@ def test_files_round_trip(field, tmp_path, extension):
     else:
         tolerance = 1 / 128 + 1e-6 if extension == "png" else 1e-6
         assert_allclose(back.flow, np.where(field.valid[..., None], field.flow, np.nan), atol=tolerance)
-    single = jacoflow.estimate(list(scenes.Scene("affine", width=32, height=32).frames(3).astype(np.float32)))
+    single = jacoflow.flow(*scenes.Scene("affine", width=32, height=32).frames(3).astype(np.float32))
     single.save(path)
     assert FlowField.load(path).flow.dtype == np.float32
 
 
 def test_points_and_stacks_go_to_npz(tmp_path):
     frames = scenes.Scene("affine", width=32, height=32).frames(4)
-    points = jacoflow.estimate(list(frames[:3]), grid=jacoflow.SamplingGrid(points=[[3, 4], [10, 11]]))
+    points = jacoflow.flow(*frames[:3], grid=jacoflow.SamplingGrid(points=[[3, 4], [10, 11]]))
     points.save(tmp_path / "points.npz")
     back = FlowField.load(tmp_path / "points.npz")
     assert_array_equal(back.points, points.points)
     assert_array_equal(back.flow, points.flow)
-    stack = jacoflow.estimate(frames)
+    stack = jacoflow.estimate(frames, ends="drop")
     stack.save(tmp_path / "stack")
     names = sorted(path.name for path in (tmp_path / "stack").iterdir())
     assert names == ["flow_000001.npz", "flow_000002.npz"]
@@ -249,7 +249,7 @@ def test_points_and_stacks_go_to_npz(tmp_path):
 
 
 def test_indexing_a_stack():
-    stack = jacoflow.estimate(scenes.Scene("affine", width=32, height=32).frames(5))
+    stack = jacoflow.estimate(scenes.Scene("affine", width=32, height=32).frames(5), ends="drop")
     assert len(stack) == 3 and stack.flow.shape == (3, 32, 32, 2)
     assert_array_equal(stack[-1].flow, stack.flow[2])
     assert [field.frame_index for field in stack] == [1, 2, 3]

@@ -68,7 +68,7 @@ def sequence(count=3):
 
 
 def field(method="instantaneous", **options):
-    return jacoflow.estimate(sequence(), method=method, **options)
+    return jacoflow.estimate(sequence(), method=method, **options, ends="drop")
 
 
 def results(threads):

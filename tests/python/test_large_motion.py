@@ -39,7 +39,7 @@ def moved(angle, shift, seed):
 
 
 def error(frames, truth, inside, preset):
-    field = jacoflow.estimate(frames, method=jacoflow.CoarseToFine(preset=preset), covariance=False)
+    field = jacoflow.flow(*frames, method=jacoflow.CoarseToFine(preset=preset), covariance=False)
     return float(np.linalg.norm(field.flow - truth, axis=-1)[inside].mean())
 
 

@@ -24,26 +24,26 @@ def test_a_result_does_not_depend_on_whose_memory_it_lies_in():
     mask = np.ones((150, 200), bool)
     mask[40:60, 50:90] = False
     for dtype in (np.float32, np.float64, np.uint8):
-        first = values(jacoflow.estimate(frames(1, dtype=dtype), **OPTIONS))
+        first = values(jacoflow.flow(*frames(1, dtype=dtype), **OPTIONS))
         for other in (frames(2, dtype=dtype), frames(2, (150, 200), dtype)):
-            jacoflow.estimate(other, **OPTIONS)
+            jacoflow.flow(*other, **OPTIONS)
             bad = [np.array(frame, copy=True) for frame in frames(3, dtype=dtype)]
-            jacoflow.estimate(bad, mask=mask, **OPTIONS)
-            jacoflow.estimate(bad, **{**OPTIONS, "method": jacoflow.Instantaneous(model="translational")})
-            assert same(values(jacoflow.estimate(frames(1, dtype=dtype), **OPTIONS)), first)
+            jacoflow.flow(*bad, mask=mask, **OPTIONS)
+            jacoflow.flow(*bad, **{**OPTIONS, "method": jacoflow.Instantaneous(model="translational")})
+            assert same(values(jacoflow.flow(*frames(1, dtype=dtype), **OPTIONS)), first)
 
 
 def test_a_result_that_is_kept_is_never_written_to_again():
-    kept = jacoflow.estimate(frames(1), **OPTIONS)
+    kept = jacoflow.flow(*frames(1), **OPTIONS)
     before, view = values(kept), kept.u
-    part = jacoflow.estimate(np.stack(frames(4) + frames(5)), **OPTIONS)[1]
+    part = jacoflow.estimate(np.stack(frames(4) + frames(5)), **OPTIONS, ends="drop")[1]
     stack = values(part)
     for seed in range(2, 6):
-        jacoflow.estimate(frames(seed), **OPTIONS)
+        jacoflow.flow(*frames(seed), **OPTIONS)
     assert same(values(kept), before) and same(values(part), stack)
     del kept
     for seed in range(2, 6):
-        jacoflow.estimate(frames(seed), **OPTIONS)
+        jacoflow.flow(*frames(seed), **OPTIONS)
     assert np.array_equal(view, before[0][..., 0], equal_nan=True)
 
 
@@ -52,4 +52,4 @@ def test_a_stream_gives_what_triples_give():
     stream = jacoflow.FlowEstimator(**OPTIONS)
     fields = [field for field in map(stream.push, sequence) if field is not None]
     for t, field in enumerate(fields):
-        assert same(values(field), values(jacoflow.estimate(sequence[t : t + 3], **OPTIONS)))
+        assert same(values(field), values(jacoflow.flow(*sequence[t : t + 3], **OPTIONS)))

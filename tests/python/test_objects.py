@@ -31,7 +31,7 @@ def square(side, before, after, *, background=(0, 0), seed=0):
 
 def error(frames, side, after, **options):
     """Mean end-point error, px, of the square, 4 px within its edge."""
-    field = jacoflow.estimate(frames, covariance=False, **grouped(**options))
+    field = jacoflow.flow(*frames, covariance=False, **grouped(**options))
     middle = slice(SIZE // 2 - side // 2 + 4, SIZE // 2 + side // 2 - 3)
     return float(np.hypot(field.u - after[0], field.v - after[1])[middle, middle].mean())
 
@@ -91,7 +91,7 @@ def test_beside_motion_boundaries_three_frames_are_nearly_as_good_as_two():
         truth = np.where((beyond < 0)[..., None], after, background)
         for seed in range(3):
             frames = square(60, after, after, background=background, seed=seed)
-            fields = (jacoflow.estimate(frames[n:], covariance=False) for n in (1, 0))
+            fields = (jacoflow.flow(*frames[n:], covariance=False) for n in (1, 0))
             errors.append([np.linalg.norm(field.flow - truth, axis=-1)[(beyond > -12) & (beyond < 16)].mean() for field in fields])
     pair, triple = np.mean(errors, axis=0)
     assert triple < 1.05 * pair, (pair, triple)
@@ -106,6 +106,6 @@ def test_what_is_masked_explains_no_motion():
         rng = np.random.default_rng(seed)
         surface = texture(rng)
         frames = [(np.roll(surface, (2 * time, 6 * time), (0, 1)) + rng.standard_normal(surface.shape)).astype(np.float32) for time in (-1, 0, 1)]
-        field = jacoflow.estimate(frames, covariance=False, mask=seen, **grouped(preset="accurate"))
+        field = jacoflow.flow(*frames, covariance=False, mask=seen, **grouped(preset="accurate"))
         errors.append(np.hypot(field.u - 6, field.v - 2)[seen].mean())
     assert np.mean(errors) < 0.3, errors

@@ -34,7 +34,7 @@ def test_textures_are_observable_and_flat_or_striped_pictures_are_not():
 def test_status_of_the_estimator_agrees_with_the_map():
     frames = list(scenes.Scene("affine", width=32, height=32).frames(3))
     found = jacoflow.observability(frames)
-    field = jacoflow.estimate(frames, method="instantaneous", diagnostics=True)
+    field = jacoflow.flow(*frames, method="instantaneous", diagnostics=True)
     assert_array_equal(field.rank[found.known], found.rank[found.known])
 
 

@@ -82,7 +82,7 @@ def steady_flow():
 def test_estimates_of_a_steady_flow_agree_within_their_deviations(count):
     """Flow of up to 15 px/frame, from frames 1-2, 2-3, 3-4 and from 1-2-3, 2-3-4: differences over their standard deviation."""
     frames = steady_flow()
-    fields = [jacoflow.estimate(frames[k : k + count], method="coarse_to_fine") for k in range(5 - count)]
+    fields = [jacoflow.flow(*frames[k : k + count], method="coarse_to_fine") for k in range(5 - count)]
     inner = np.s_[16:-16, 16:-16]
     for one, other in zip(fields, fields[1:], strict=False):
         assert np.nanmax(one.speed) > 10
@@ -97,8 +97,8 @@ def test_estimates_of_a_steady_flow_agree_within_their_deviations(count):
 def test_fusion_of_a_steady_flow_agrees_with_each_estimate():
     frames = steady_flow()
     options = {"method": jacoflow.CoarseToFine(time_scheme="pair")}
-    plain = jacoflow.estimate(np.stack(frames), **options)
-    fused = jacoflow.estimate(np.stack(frames), temporal="recursive", **options)
+    plain = jacoflow.estimate(np.stack(frames), ends="drop", **options)
+    fused = jacoflow.estimate(np.stack(frames), ends="drop", temporal="recursive", **options)
     inner = np.s_[16:-16, 16:-16]
     assert np.median(fused[-1].std("u")[inner]) < 0.95 * np.median(plain[-1].std("u")[inner])
     # Nothing changed, so that few pixels start anew.

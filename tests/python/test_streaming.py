@@ -24,7 +24,7 @@ def frames():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_stream_equals_batch(frames, method):
-    batch = jacoflow.estimate(frames, method=method)
+    batch = jacoflow.estimate(frames, method=method, ends="drop")
     estimator = FlowEstimator(method=method)
     assert estimator.frames_needed == 3
     stream = [estimator.push(frame) for frame in frames]
@@ -38,35 +38,35 @@ def test_stream_equals_batch(frames, method):
 
 
 def test_lists_and_arrays(frames):
-    assert jacoflow.estimate(list(frames[:3])).shape == (32, 40)
-    assert jacoflow.estimate(tuple(frames[:3])).shape == (32, 40)
-    assert jacoflow.estimate(frames[:3]).shape == (1, 32, 40)
-    assert jacoflow.estimate(list(frames)).shape == (4, 32, 40)
-    assert jacoflow.estimate(list(frames[:2]), method="lucas_kanade").shape == (32, 40)
-    pair = jacoflow.estimate(list(frames[:2]))
+    assert jacoflow.flow(*frames[:3]).shape == (32, 40)
+    assert jacoflow.flow(*frames[:3]).shape == (32, 40)
+    assert jacoflow.estimate(frames[:3], ends="drop").shape == (1, 32, 40)
+    assert jacoflow.estimate(list(frames), ends="drop").shape == (4, 32, 40)
+    assert jacoflow.flow(*frames[:2], method="lucas_kanade").shape == (32, 40)
+    pair = jacoflow.flow(*frames[:2])
     assert pair.shape == (32, 40) and pair.frame_index == 0
     with pytest.raises(ValueError, match="at least 3 frames"):
         jacoflow.estimate(list(frames[:2]), method="instantaneous")
 
 
 def test_backward_fields_belong_to_the_newest_frame(frames):
-    field = jacoflow.estimate(frames, method=jacoflow.Windowed(time_scheme="backward"))
+    field = jacoflow.estimate(frames, method=jacoflow.Windowed(time_scheme="backward"), ends="drop")
     assert [each.frame_index for each in field] == [2, 3, 4, 5]
 
 
 def test_preparation_is_done_on_the_way(frames):
     prepared = np.stack([jacoflow.smooth(jacoflow.quantise(frame), 1.5) for frame in frames])
-    one = jacoflow.estimate(frames, method="lucas_kanade", preprocess=jacoflow.Preprocess(quantise=1.0, smooth=1.5))
-    other = jacoflow.estimate(prepared, method="lucas_kanade")
+    one = jacoflow.estimate(frames, method="lucas_kanade", preprocess=jacoflow.Preprocess(quantise=1.0, smooth=1.5), ends="drop")
+    other = jacoflow.estimate(prepared, method="lucas_kanade", ends="drop")
     assert_array_equal(one.flow, other.flow)
 
 
 def test_colour_is_luminance_on_request(frames):
     grey = np.clip(np.round(frames), 0, 255).astype(np.uint8)
     colour = np.stack([grey, grey, grey, np.full_like(grey, 255)], axis=-1)
-    expected = jacoflow.estimate(grey)
-    assert_array_equal(jacoflow.estimate(colour, preprocess=jacoflow.Preprocess(colour="luminance")).flow, expected.flow)
-    listed = jacoflow.estimate([frame[..., :3] for frame in colour], preprocess=jacoflow.Preprocess(colour="luminance"))
+    expected = jacoflow.estimate(grey, ends="drop")
+    assert_array_equal(jacoflow.estimate(colour, preprocess=jacoflow.Preprocess(colour="luminance"), ends="drop").flow, expected.flow)
+    listed = jacoflow.estimate([frame[..., :3] for frame in colour], preprocess=jacoflow.Preprocess(colour="luminance"), ends="drop")
     assert_array_equal(listed.flow, expected.flow)
     estimator = FlowEstimator(preprocess=jacoflow.Preprocess(colour="luminance"))
     assert_array_equal([estimator.push(frame) for frame in colour][2].flow, expected[0].flow)
@@ -191,11 +191,11 @@ def test_filter_grey_levels_do_not_depend_on_the_sample_type(frames):
 
 def test_progress_is_reported(frames, capsys):
     told = []
-    jacoflow.estimate(frames, progress=lambda done, total: told.append((done, total)))
+    jacoflow.estimate(frames, progress=lambda done, total: told.append((done, total)), ends="drop")
     assert told == [(k, 6) for k in range(1, 7)]
-    jacoflow.estimate(frames, progress=True)
+    jacoflow.estimate(frames, progress=True, ends="drop")
     assert "6/6 frames\n" in capsys.readouterr().err
-    jacoflow.estimate(frames, progress=False)
+    jacoflow.estimate(frames, progress=False, ends="drop")
     assert capsys.readouterr().err == ""
 
 

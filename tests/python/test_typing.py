@@ -17,7 +17,7 @@ def frames() -> NDArray[np.float64]:
 
 def test_estimate() -> None:
     stack = frames()
-    field = jacoflow.estimate(list(stack[:3]), method="windowed", fps=25.0, grid=jacoflow.SamplingGrid(region=(2, 2, 20, 20), stride=2))
+    field = jacoflow.flow(*stack[:3], method="windowed", fps=25.0, grid=jacoflow.SamplingGrid(region=(2, 2, 20, 20), stride=2))
     assert_type(field, FlowField)
     assert_type(field.frame_index, int)
     assert_type(field.status, NDArray[np.uint8])
@@ -30,7 +30,7 @@ def test_estimate() -> None:
     covariance = field.covariance
     assert covariance is not None and covariance.shape[-2:] == (6, 6)
     assert Status(int(field.status[5, 5])) is Status.OK
-    points = jacoflow.estimate(stack, method=jacoflow.Windowed(neighbourhood=[(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)]), grid=jacoflow.SamplingGrid(points=[(3, 4), (5, 6)]))
+    points = jacoflow.estimate(stack, method=jacoflow.Windowed(neighbourhood=[(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)]), grid=jacoflow.SamplingGrid(points=[(3, 4), (5, 6)]), ends="drop")
     assert points.shape == (2, 2)
 
 

@@ -14,7 +14,7 @@ def test_error_and_intervals(preset, bar):
     errors, held = [], []
     for seed in (7, 8):
         for move in MOVES:
-            field = jacoflow.estimate(undersampled(seed, move), method=jacoflow.CoarseToFine(preset=preset))
+            field = jacoflow.flow(*undersampled(seed, move), method=jacoflow.CoarseToFine(preset=preset))
             error = inner(field.flow - np.array(move))
             std = inner(np.stack([field.std("u"), field.std("v")], axis=-1))
             errors.append(np.mean(error**2))
@@ -26,5 +26,5 @@ def test_error_and_intervals(preset, bar):
 
 def test_flow_does_not_depend_on_whether_its_covariance_is_wanted():
     frames = undersampled(9, MOVES[0])
-    alone = jacoflow.estimate(frames, method=jacoflow.CoarseToFine(), covariance=False)
-    np.testing.assert_array_equal(alone.flow, jacoflow.estimate(frames, method=jacoflow.CoarseToFine()).flow)
+    alone = jacoflow.flow(*frames, method=jacoflow.CoarseToFine(), covariance=False)
+    np.testing.assert_array_equal(alone.flow, jacoflow.flow(*frames, method=jacoflow.CoarseToFine()).flow)

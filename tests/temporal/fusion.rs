@@ -6,7 +6,7 @@ use jacoflow::math::random::CounterRng;
 use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
 use jacoflow::temporal::{RecursiveFusion, RecursiveOptions};
-use jacoflow::types::{FieldLayout, FlowField, SamplingGrid, Status};
+use jacoflow::types::{FieldLayout, FlowField, Interval, SamplingGrid, Status, Units};
 use nalgebra::{Matrix6, Vector6};
 
 const SIDE: usize = 40;
@@ -64,8 +64,8 @@ impl Estimates {
             sites: SamplingGrid::default(),
             model: "affine".into(),
             parameters: jacoflow::types::MOTION_NAMES.map(String::from).to_vec(),
-            frame_period: None,
-            pixel_pitch: (1.0, 1.0),
+            units: Units::default(),
+            interval: Interval::Instant,
             frame_index: k,
             correlation_length: 0.0,
         };

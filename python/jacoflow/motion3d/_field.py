@@ -38,7 +38,7 @@ def estimate_field_motion(
     Parameters
     ----------
     field : FlowField
-        One field (not a stack) with a covariance, in px/frame.
+        One field (not a stack) with a covariance, in any units.
     K : array (3, 3)
         Camera matrix, px.
     spacing : px or None
@@ -60,7 +60,7 @@ def estimate_field_motion(
     Raises
     ------
     ValueError
-        For a stack, a field without a covariance or with a `pixel_pitch`, for a `scene` without a `region` or whose rotation is not known, for no `K`, and for options that do not fit.
+        For a stack and a field without a covariance, for a `scene` without a `region` or whose rotation is not known, for no `K`, and for options that do not fit.
     TypeError
         For a `field` or `scene` that is none, and for options that are not known.
     """
@@ -96,7 +96,7 @@ def time_to_contact_map(
     Parameters
     ----------
     field : FlowField
-        One field (not a stack) with a covariance, in px/frame.
+        One field (not a stack) with a covariance, in any units.
     result : MotionEstimate
         The motion of its scene, from `estimate_field_motion`.
     K : array (3, 3)
@@ -107,7 +107,7 @@ def time_to_contact_map(
     Raises
     ------
     ValueError
-        For a stack, a field without a covariance or with a `pixel_pitch`, and for a matrix that is none of a camera.
+        For a stack and a field without a covariance, and for a matrix that is none of a camera.
     """
     kind("field", field, FlowField)
     kind("result", result, MotionEstimate)

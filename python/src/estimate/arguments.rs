@@ -101,13 +101,11 @@ impl Arguments {
     }
 
     fn common(&self, py: Python<'_>, method: &Method, systematic: bool) -> Outcome<EstimatorOptions> {
-        let default = EstimatorOptions::default();
         Ok(EstimatorOptions {
             sites: options::grid(py, &self.grid)?,
             mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
             initial: self.initial.as_ref().map(|flow| initial(flow.bind(py))).transpose()?,
-            pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(default.pixel_pitch),
-            frame_period: options::frame_period(self.fps)?,
+            units: options::units(py, &self.pixel_pitch, self.length_unit.as_deref(), self.fps)?,
             covariance: self.covariance.unwrap_or(method.info().has_covariance),
             systematic,
             diagnostics: self.diagnostics,

@@ -1,4 +1,4 @@
-//! `estimate`, and in `stream` `FlowEstimator`.
+//! `estimate` and `flow`, and in `stream` `FlowEstimator`.
 
 mod arguments;
 mod stream;
@@ -13,7 +13,9 @@ use arguments::{Arguments, estimator_options};
 use jacoflow::error::Error;
 use jacoflow::temporal::AnyFlowStream;
 use jacoflow::types::AnyField;
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::types::{PyList, PyTuple};
 
 pub use stream::{FlowEstimator, restore_estimator};
 
@@ -40,6 +42,21 @@ impl Growing {
         }
     }
 
+    /// Adds fields without an estimate, like `field`, for the frames up to `frame`.
+    fn fill(&mut self, field: &AnyField, frame: usize) -> jacoflow::Result<()> {
+        let first = match self {
+            Self::None => 0,
+            Self::Single(packed) => packed.count,
+            Self::Double(packed) => packed.count,
+        };
+        (first..frame).try_for_each(|index| {
+            self.add(match field {
+                AnyField::Single(field) => AnyField::Single(field.missing(index)),
+                AnyField::Double(field) => AnyField::Double(field.missing(index)),
+            })
+        })
+    }
+
     fn finish(self) -> Outcome<FlowField> {
         match self {
             Self::Single(packed) => Ok(FlowField::stack(packed)),
@@ -49,24 +66,63 @@ impl Growing {
     }
 }
 
-/// The field or fields of a whole sequence.
-fn run(py: Python<'_>, frames: &Frames<'_>, stream: &mut AnyFlowStream, progress: &Reporter<'_>) -> Outcome<FlowField> {
+/// What a stack has at frames without an estimate.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Ends {
+    /// NaN.
+    Missing,
+    /// No field.
+    Dropped,
+}
+
+impl Ends {
+    fn parse(word: &str) -> Outcome<Self> {
+        match word {
+            "nan" => Ok(Self::Missing),
+            "drop" => Ok(Self::Dropped),
+            other => Err(Error::argument("ends", "\"nan\" or \"drop\"", format!("{other:?}")).into()),
+        }
+    }
+}
+
+/// Refuses fewer frames than a field needs.
+fn check_count(frames: &Frames<'_>, stream: &AnyFlowStream) -> Outcome<()> {
     let needed = stream.plan().estimator().frames_needed();
     if frames.count < needed {
-        let expected = format!("at least {needed} frames");
-        return Err(Error::argument("frames", expected, format!("{} frames", frames.count)).into());
+        let got = if frames.count == 1 { "1 frame".into() } else { format!("{} frames", frames.count) };
+        return Err(Error::argument("frames", format!("at least {needed} frames"), got).into());
     }
+    Ok(())
+}
+
+/// The fields of a whole sequence.
+fn run(
+    py: Python<'_>,
+    frames: &Frames<'_>,
+    (stream, ends): (&mut AnyFlowStream, Ends),
+    progress: &Reporter<'_>,
+) -> Outcome<FlowField> {
+    check_count(frames, stream)?;
     let mut fields = Growing::None;
+    let mut last = None;
     for index in 0..frames.count {
         let frame = frames.get(index)?;
-        let field = py.detach(|| stream.push(frame))?;
-        progress.step(index + 1, frames.count)?;
-        if let Some(field) = field {
-            if !frames.is_array && frames.count == needed {
-                return Ok(FlowField::any(field));
-            }
-            fields.add(field)?;
+        let mut field = py.detach(|| stream.push_at(frame, None))?;
+        if ends == Ends::Missing && index == 1 && field.is_none() {
+            field = py.detach(|| stream.first_step())?;
         }
+        progress.step(index + 1, frames.count)?;
+        let Some(field) = field else { continue };
+        if ends == Ends::Missing {
+            fields.fill(&field, field.frame_index())?;
+        }
+        if index + 1 == frames.count {
+            last = Some(field.clone());
+        }
+        fields.add(field)?;
+    }
+    if let Some(field) = last.filter(|_| ends == Ends::Missing) {
+        fields.fill(&field, frames.count)?;
     }
     fields.finish()
 }
@@ -74,19 +130,26 @@ fn run(py: Python<'_>, frames: &Frames<'_>, stream: &mut AnyFlowStream, progress
 /// `estimate` with the options as keywords.
 macro_rules! define_estimate {
     ([] $($option:ident: $kept:ty as $taken:ty = $default:tt,)*) => {
-        /// Flow, its Jacobian and their covariance, from two or three frames or from a stack.
+        /// Flow, its Jacobian and their covariance at every frame of a sequence.
         ///
-        /// A list or tuple of three frames (H, W) gives one FlowField (H, W), one of two frames as well
-        /// (every method but "instantaneous"); a longer list gives a stack (T - 2, H, W), and so does an
-        /// array (T, H, W) of any length. Frames are uint8, uint16, float32 or float64 in any grey scale: the
-        /// intensity gain does not change the flow. float64 is computed in float64, everything else in
-        /// float32. Inputs are never modified.
+        /// T frames give a FlowField of T fields, (T, H, W), whatever the container: field t belongs to frame
+        /// t. Frames at the ends that lack a neighbour have NaN and the status MISSING_FRAME: with the
+        /// default method, which gives the step to the next frame, the last; the first step is estimated
+        /// from its two frames. Two frames are estimated as a pair (every method but "instantaneous").
+        /// For one field from two or three frames see `flow`. Frames are uint8, uint16, float32 or float64 in
+        /// any grey scale: the intensity gain does not change the flow. float64 is computed in float64,
+        /// everything else in float32. Inputs are never modified.
         ///
         /// Parameters
         /// ----------
         /// frames : array (T, H, W), or list, tuple or iterator of arrays (H, W)
         ///     Oldest first, one size, at least 3 x 3 px (`coarse_to_fine` finds nothing in frames less than
         ///     5 px wide or high).
+        /// ends : "nan" (default) or "drop"
+        ///     "drop" leaves out the frames at the ends that lack a neighbour: two frames give one field,
+        ///     three or more (T - 2, H, W), or (T - 1, H, W) with the time scheme "pair".
+        /// pairs : bool
+        ///     Frames of double-frame recordings, 0 and 1, 2 and 3, ...: T / 2 fields, and none between pairs.
         /// method : "coarse_to_fine", "windowed", "instantaneous", "lucas_kanade", "horn_schunck", or options
         ///     A name means the method with its defaults; `CoarseToFine` (default), `Windowed`,
         ///     `Instantaneous`, `LucasKanade` and `HornSchunck` hold its options and say what it is for.
@@ -112,9 +175,11 @@ macro_rules! define_estimate {
         /// preprocess : `Preprocess`
         ///     Quantising, smoothing and conversion of colour, before anything else.
         /// fps : float, frames/s
-        ///     For quantities per second.
-        /// pixel_pitch : float or (dx, dy), any length unit
-        ///     Size of a pixel; flow then comes in that unit per frame.
+        ///     Times are then in seconds: flow in px/s, the Jacobian in 1/s.
+        /// pixel_pitch : float or (dx, dy), in `length_unit`
+        ///     Size of a pixel; lengths are then in that unit.
+        /// length_unit : str
+        ///     Its name, "mm" for example; default "length".
         /// precision : "float32" or "float64"
         ///     Default: that of the frames.
         /// threads : int
@@ -134,26 +199,99 @@ macro_rules! define_estimate {
         /// TypeError
         ///     For another dtype.
         #[pyfunction]
-        #[pyo3(signature = (frames, *, $($option = $default,)* progress = None))]
+        #[pyo3(signature = (frames, *more, ends = "nan", pairs = false, $($option = $default,)* progress = None))]
         pub fn estimate(
             frames: &Bound<'_, PyAny>,
+            more: &Bound<'_, PyTuple>,
+            ends: &str,
+            pairs: bool,
             $($option: $taken,)*
             progress: Option<&Bound<'_, PyAny>>,
         ) -> Outcome<FlowField> {
-            estimate_sequence(frames, Arguments { $($option: $option.into()),* }, progress)
+            if !more.is_empty() {
+                let got = format!("frames: expected one stack or list of frames, got {} arguments; for one field \
+                    from two or three frames call jacoflow.flow(a, b) or jacoflow.flow(a, b, c)", more.len() + 1);
+                return Err(PyTypeError::new_err(got).into());
+            }
+            let kind = Kind { ends: Ends::parse(ends)?, is_pairs: pairs };
+            estimate_sequence(frames, kind, Arguments { $($option: $option.into()),* }, progress)
+        }
+
+        /// One field, flow with its Jacobian and covariance, from two or three frames.
+        ///
+        /// Two frames give the step from the first to the second, at the pixels of the first (every method
+        /// but "instantaneous"). Three give that from the second to the third, at the pixels of the second;
+        /// the first helps where motion is steady.
+        ///
+        /// Parameters
+        /// ----------
+        /// first, second, third : arrays (H, W)
+        ///     Frames, oldest first, as in `estimate`.
+        ///
+        /// The options, their units and the errors are those of `estimate`.
+        ///
+        /// >>> import jacoflow
+        /// >>> a, b = jacoflow.scenes.Scene("affine", width=96, height=64).frames(2)
+        /// >>> jacoflow.flow(a, b).shape
+        /// (64, 96)
+        #[pyfunction]
+        #[pyo3(signature = (first, second, third = None, *, $($option = $default,)*))]
+        pub fn flow(
+            first: &Bound<'_, PyAny>,
+            second: &Bound<'_, PyAny>,
+            third: Option<&Bound<'_, PyAny>>,
+            $($option: $taken,)*
+        ) -> Outcome<FlowField> {
+            let frames: Vec<_> = [Some(first), Some(second), third].into_iter().flatten().collect();
+            estimate_one(&PyList::new(first.py(), frames)?, Arguments { $($option: $option.into()),* })
         }
     };
 }
 estimator_options!(define_estimate []);
 
+/// Which fields of a sequence are wanted.
+struct Kind {
+    ends: Ends,
+    is_pairs: bool,
+}
+
 /// What `estimate` does.
 fn estimate_sequence(
     frames: &Bound<'_, PyAny>,
+    kind: Kind,
     arguments: Arguments,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> Outcome<FlowField> {
     let py = frames.py();
     let frames = Frames::new(frames, arguments.colour(py)?)?;
-    let is_pair = !frames.is_array && frames.count <= 2;
-    run(py, &frames, &mut arguments.stream(py, is_pair)?, &Reporter::new(py, progress)?)
+    let mut stream = arguments.stream(py, kind.is_pairs || frames.count <= 2)?;
+    let mut ends = kind.ends;
+    if kind.is_pairs {
+        if frames.count % 2 == 1 {
+            let got = format!("{} frames", frames.count);
+            return Err(Error::argument("frames", "an even number, in pairs", got).into());
+        }
+        stream = AnyFlowStream::new(stream.plan().clone().of_pairs()?, stream.precision());
+        ends = Ends::Dropped;
+    }
+    run(py, &frames, (&mut stream, ends), &Reporter::new(py, progress)?)
+}
+
+/// What `flow` does.
+fn estimate_one(frames: &Bound<'_, PyList>, arguments: Arguments) -> Outcome<FlowField> {
+    let py = frames.py();
+    let frames = Frames::new(frames, arguments.colour(py)?)?;
+    let mut stream = arguments.stream(py, frames.count == 2)?;
+    let needed = stream.plan().estimator().frames_needed();
+    if frames.count != needed {
+        let got = format!("{} frames", frames.count);
+        return Err(Error::argument("frames", format!("{needed} frames for this method"), got).into());
+    }
+    for index in 0..frames.count {
+        let frame = frames.get(index)?;
+        if let Some(field) = py.detach(|| stream.push_at(frame, None))? {
+            return Ok(FlowField::any(field));
+        }
+    }
+    Err(Error::Numerical("no field came of the frames".into()).into())
 }

@@ -36,6 +36,7 @@ macro_rules! save {
         if let Some((sites, state)) = stream.fused() {
             memory.set_item("fused", (sites, arrays::owned(py, &[state.len()], state.to_vec())?))?;
         }
+        memory.set_item("times", stream.times().collect::<Vec<_>>())?;
         memory.set_item("pushed", stream.pushed())?;
     }};
 }
@@ -45,11 +46,16 @@ impl FlowEstimator {
     /// Takes the next frame (H, W), in any grey unit; returns a FlowField (px/frame) once enough frames have
     /// come, before that None.
     ///
-    /// A frame that raises an error (ValueError for another size, TypeError for another dtype) is not kept.
-    fn push(&mut self, frame: &Bound<'_, PyAny>) -> Outcome<Option<FlowField>> {
+    /// `time`, s, is when the frame was taken, for every frame or none: fields are then per second, each by
+    /// the time between its own frames, whatever `fps` says. Where a frame is missing, "coarse_to_fine"
+    /// estimates the step to the next one from two frames. A frame that raises an error (ValueError for
+    /// another size or a time not after the last, TypeError for another dtype) is not kept.
+    #[pyo3(signature = (frame, *, time=None))]
+    fn push(&mut self, frame: &Bound<'_, PyAny>, time: Option<f64>) -> Outcome<Option<FlowField>> {
         let py = frame.py();
         let frame = arrays::frame("frame", frame, self.colour)?;
-        let field = py.detach(|| self.stream.push(frame)).map_err(|error| renamed(error, "frames", "frame"))?;
+        let field =
+            py.detach(|| self.stream.push_at(frame, time)).map_err(|error| renamed(error, "frames", "frame"))?;
         Ok(field.map(FlowField::any))
     }
 
@@ -107,13 +113,13 @@ impl FlowEstimator {
 
 /// A stream of precision `$real` from what [`save`] wrote.
 macro_rules! restored {
-    ($real:ty, $plan:expr, $frames:expr, $pushed:expr, $fused:expr) => {{
+    ($real:ty, $plan:expr, $frames:expr, $times:expr, $pushed:expr, $fused:expr) => {{
         let fused = $fused.map(|saved| -> Outcome<_> {
             let (sites, state): (usize, PyReadonlyArray1<'_, $real>) = saved.extract()?;
             Ok((sites, state.as_slice()?.to_vec()))
         });
         let mut stream = FlowStream::<$real>::new($plan)?;
-        stream.restore($frames.iter().map(AnyFrame::to_real), $pushed, fused.transpose()?)?;
+        stream.restore($frames.iter().map(AnyFrame::to_real).zip($times), $pushed, fused.transpose()?)?;
         stream
     }};
 }
@@ -123,16 +129,17 @@ macro_rules! restored {
 pub fn restore_estimator(py: Python<'_>, options: Arguments, memory: &Bound<'_, PyDict>) -> Outcome<FlowEstimator> {
     let mut estimator = FlowEstimator::from_arguments(py, options)?;
     let Some(frames) = memory.get_item("frames")? else { return Ok(estimator) };
-    let missing = || Error::argument("memory", "the entries frames, pushed and dtype", "fewer");
+    let missing = || Error::argument("memory", "the entries frames, times, pushed and dtype", "fewer");
+    let times: Vec<Option<f64>> = memory.get_item("times")?.ok_or_else(missing)?.extract()?;
     let pushed: usize = memory.get_item("pushed")?.ok_or_else(missing)?.extract()?;
     let dtype: String = memory.get_item("dtype")?.ok_or_else(missing)?.extract()?;
     let frames: Vec<AnyFrame> =
         frames.try_iter()?.map(|frame| arrays::frame("memory", &frame?, ColourRule::Refuse)).collect::<Outcome<_>>()?;
     let (plan, fused) = (estimator.stream.plan().clone(), memory.get_item("fused")?);
     let stream = if frames.iter().any(|frame| matches!(frame, AnyFrame::F64(_))) {
-        Stream::Double(restored!(f64, plan, frames, pushed, fused))
+        Stream::Double(restored!(f64, plan, frames, times, pushed, fused))
     } else {
-        Stream::Single(restored!(f32, plan, frames, pushed, fused))
+        Stream::Single(restored!(f32, plan, frames, times, pushed, fused))
     };
     estimator.stream.resume(options::known_dtype(&dtype)?, stream);
     Ok(estimator)

@@ -5,6 +5,7 @@ use crate::arrays;
 use crate::errors::Outcome;
 use jacoflow::error::Error;
 use jacoflow::flow::{PointCovariance, advect};
+use jacoflow::types::Status;
 use pyo3::prelude::*;
 
 /// What covariances may be, for messages.
@@ -13,10 +14,25 @@ const MATRICES: &str = "symmetric matrices with variances of at least 0, shape (
 /// Asymmetry that rounding explains, relative to the variances.
 const ROUNDING: f64 = 1e-9;
 
+impl FlowField {
+    /// Number of fields up to the last that has a next frame.
+    fn steps(&self) -> usize {
+        each!(self.store, packed => {
+            let sites = packed.site_count();
+            let is_missing = |index: &usize| {
+                let codes = &packed.status[(self.start + index) * sites..(self.start + index + 1) * sites];
+                sites > 0 && codes.iter().all(|&code| code == Status::MissingFrame as u8)
+            };
+            self.count - (0..self.count).rev().take_while(is_missing).count()
+        })
+    }
+}
+
 #[pymethods]
 impl FlowField {
     /// Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its
-    /// fields, (T + 1, N, 2), beginning with `points`.
+    /// fields, (T + 1, N, 2), beginning with `points`. Fields at the end without a next frame are left out:
+    /// those of T frames give where the points are at each of them, (T, N, 2).
     ///
     /// `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites
     /// the flow is bilinear in what the four sites about a point say of it by flow and Jacobian: affine
@@ -28,8 +44,7 @@ impl FlowField {
     /// the point's and from field to field, and as alike at neighbouring sites. Zeros begin with certain
     /// points.
     ///
-    /// A grid in px only: ValueError for a list of points, for another `pixel_pitch` than 1, for other
-    /// shapes, and for matrices that are no covariance.
+    /// ValueError for a field of points, for other shapes, and for matrices that are no covariance.
     #[pyo3(signature = (points, covariance=None))]
     fn advect<'py>(
         &self,
@@ -41,7 +56,7 @@ impl FlowField {
         let spread = covariance.map(|object| matrices(object, first.len())).transpose()?;
         let mut times = vec![(first, spread)];
         each!(self.store, packed => {
-            for index in 0..self.count {
+            for index in 0..self.steps() {
                 let field = self.core(packed, index);
                 let (points, spread) = &times[index];
                 let moved = py.detach(|| advect(&field, points, spread.as_deref()))?;

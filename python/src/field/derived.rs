@@ -1,11 +1,11 @@
 //! Parameters and derived quantities by name.
 
+use super::measurement::Measured;
 use crate::errors::Outcome;
 use jacoflow::error::{Error, Result};
 use jacoflow::flow::derived::{Aggregate, Quantity, parameter_mean, plane, planes, region_mean};
-use jacoflow::flow::model::ModelKind;
 use jacoflow::math::Real;
-use jacoflow::types::{FieldLayout, FlowField, Rect};
+use jacoflow::types::{FieldLayout, FlowField, MOTION_NAMES, Region, Units};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict};
 
@@ -32,7 +32,7 @@ pub fn std<T: Real>(field: &FlowField<T>, name: &str) -> Result<Vec<f64>> {
 pub fn region<T: Real>(
     field: &FlowField<T>,
     name: &str,
-    region: Option<Rect>,
+    region: Option<&Region>,
     aggregate: Option<&str>,
 ) -> Result<(f64, f64, usize)> {
     let aggregate = match aggregate {
@@ -52,25 +52,37 @@ pub fn region<T: Real>(
     Ok((mean.value, mean.std, mean.count))
 }
 
-/// Unit of a parameter or quantity.
-pub fn unit(layout: &FieldLayout, name: &str) -> Result<&'static str> {
-    let parameters = ModelKind::parse(&layout.model).unwrap_or_default().parameters();
-    match parameters.iter().find(|p| p.name == name && layout.parameters.iter().any(|known| known == name)) {
-        Some(parameter) => Ok(parameter.unit()),
-        None => Ok(quantity(layout, name)?.unit(layout.frame_period.is_some())),
+/// The parameter of affine motion or the derived quantity called `name`.
+pub fn measured(layout: &FieldLayout, name: &str) -> Result<Measured> {
+    match MOTION_NAMES.iter().position(|known| *known == name) {
+        Some(place) => Ok(Measured::Parameter(place)),
+        None => quantity(layout, name).map(Measured::Derived),
     }
+}
+
+/// Unit of a parameter or quantity.
+pub fn unit(layout: &FieldLayout, name: &str) -> Result<String> {
+    if layout.parameters.iter().any(|known| known == name) {
+        return Ok(layout.units.of_parameter(name));
+    }
+    Ok(quantity(layout, name)?.unit(&layout.units))
 }
 
 fn quantity(layout: &FieldLayout, name: &str) -> Result<Quantity> {
     Quantity::parse(name).map_err(|_| {
         let quantities = Quantity::ALL.iter().map(|q| q.name());
         let names: Vec<&str> = layout.parameters.iter().map(String::as_str).chain(quantities).collect();
-        Error::argument("name", format!("one of {}", names.join(", ")), format!("{name:?}"))
+        let expected = match Quantity::suggestion(name) {
+            Some(meant) => format!("a name (did you mean {:?}?), one of {}", meant.name(), names.join(", ")),
+            None => format!("one of {}", names.join(", ")),
+        };
+        Error::argument("name", expected, format!("{name:?}"))
     })
 }
 
 /// Derived quantities with their units (per frame, with a frame period), as a dictionary.
 #[pyfunction]
 pub fn quantities(py: Python<'_>) -> Outcome<Bound<'_, PyDict>> {
-    Ok(Quantity::ALL.iter().map(|q| (q.name(), (q.unit(false), q.unit(true)))).into_py_dict(py)?)
+    let (frames, seconds) = (Units::default(), Units::new((1.0, 1.0), None, Some(1.0)));
+    Ok(Quantity::ALL.iter().map(|q| (q.name(), (q.unit(&frames), q.unit(&seconds)))).into_py_dict(py)?)
 }

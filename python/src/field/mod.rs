@@ -3,6 +3,7 @@
 
 mod advect;
 mod derived;
+mod measurement;
 mod measures;
 mod packed;
 mod properties;
@@ -18,6 +19,7 @@ use pyo3::prelude::*;
 use std::sync::Arc;
 
 pub use derived::quantities;
+pub use measurement::Measurement;
 pub use packed::Packed;
 pub use state::{restore_field, status_names};
 

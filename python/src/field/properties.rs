@@ -11,26 +11,26 @@ use std::path::PathBuf;
 
 getters! {
     FlowField;
-    /// Flow, array (..., H, W, 2): (u, v) in px/frame along x (right) and y (down), or in units of
-    /// `pixel_pitch` per frame.
+    /// Flow, array (..., H, W, 2): (u, v) along x (right) and y (down), in `unit("u")`: px/frame, lengths in
+    /// `length_unit` with a pixel pitch, times in seconds with a frame period.
     ///
     /// NaN where `status` says why. A read-only view.
     flow(this, slf) -> Outcome<Bound<'py, PyAny>> = Self::motion_slice(slf, 0, &[(2, 1)]);
-    /// Jacobian of the flow, array (..., H, W, 2, 2) in 1/frame: [[u_x, u_y], [v_x, v_y]].
+    /// Jacobian of the flow, array (..., H, W, 2, 2) in 1/frame or 1/s: [[u_x, u_y], [v_x, v_y]].
     ///
     /// A read-only view; zeros where the model assumes no derivatives.
     jacobian(this, slf) -> Outcome<Bound<'py, PyAny>> = Self::motion_slice(slf, 2, &[(2, 1), (2, 2)]);
-    /// Flow along x (right), array (..., H, W), px/frame.
+    /// Flow along x (right), array (..., H, W), in `unit("u")`, px/frame by default.
     u(this, slf) -> Outcome<Bound<'py, PyAny>> = Self::motion_slice(slf, 0, &[]);
-    /// Flow along y (down), array (..., H, W), px/frame.
+    /// Flow along y (down), array (..., H, W), in `unit("u")`, px/frame by default.
     v(this, slf) -> Outcome<Bound<'py, PyAny>> = Self::motion_slice(slf, 1, &[]);
-    /// du/dx, array (..., H, W), 1/frame.
+    /// du/dx, array (..., H, W), 1/frame or 1/s.
     u_x(this, slf) -> Outcome<Bound<'py, PyAny>> = Self::motion_slice(slf, 2, &[]);
-    /// dv/dx, array (..., H, W), 1/frame.
+    /// dv/dx, array (..., H, W), 1/frame or 1/s.
     v_x(this, slf) -> Outcome<Bound<'py, PyAny>> = Self::motion_slice(slf, 3, &[]);
-    /// du/dy, array (..., H, W), 1/frame.
+    /// du/dy, array (..., H, W), 1/frame or 1/s.
     u_y(this, slf) -> Outcome<Bound<'py, PyAny>> = Self::motion_slice(slf, 4, &[]);
-    /// dv/dy, array (..., H, W), 1/frame.
+    /// dv/dy, array (..., H, W), 1/frame or 1/s.
     v_y(this, slf) -> Outcome<Bound<'py, PyAny>> = Self::motion_slice(slf, 5, &[]);
     /// Status code of each site, uint8 array (..., H, W), see `Status`.
     status(this, slf) -> Outcome<Bound<'py, PyAny>> = each!(this.store, packed => Self::show(slf, &Slice { data: &packed.status, planes: 1, first: 0, tail: &[] }));
@@ -73,9 +73,14 @@ getters! {
     /// Size (width, height) of the frames, px.
     frame_size(this) -> (usize, usize) = this.layout().frame_size;
     /// Seconds between frames, or None.
-    frame_period(this) -> Option<f64> = this.layout().frame_period;
+    frame_period(this) -> Option<f64> = this.layout().units.frame_period;
     /// Physical size (dx, dy) of a pixel, 1 px or any length unit.
-    pixel_pitch(this) -> (f64, f64) = this.layout().pixel_pitch;
+    pixel_pitch(this) -> (f64, f64) = this.layout().units.pixel_pitch;
+    /// Name of the unit of lengths, "px" unless there is a pixel pitch.
+    length_unit(this) -> String = this.layout().units.length.clone();
+    /// What the flow at frame t is: "forward", the step to frame t + 1; "central", the mean of the steps before
+    /// and after; "instant", the velocity at frame t (no unit).
+    interval(this) -> &'static str = this.layout().interval.name();
     /// How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0
     /// where they are independent or it is not known.
     correlation_length(this) -> f64 = this.layout().correlation_length;
@@ -85,7 +90,7 @@ getters! {
 
 #[pymethods]
 impl FlowField {
-    /// Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), px/frame and 1/frame squared; None
+    /// Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), in squares of their units; None
     /// if it was not requested.
     ///
     /// Rows and columns of parameters that the model lacks are zero. A new array at every access.

@@ -4,7 +4,7 @@ use super::{FlowField, Packed, Store, Stored, each};
 use crate::arrays;
 use crate::errors::{Outcome, Raised};
 use jacoflow::error::Error;
-use jacoflow::types::{FieldLayout, Rect, SamplingGrid, Status};
+use jacoflow::types::{FieldLayout, Interval, Rect, SamplingGrid, Status, Units};
 use numpy::{PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -44,8 +44,10 @@ fn layout_state<'py>(py: Python<'py>, layout: &FieldLayout) -> Outcome<Bound<'py
     state.set_item("frame_size", layout.frame_size)?;
     state.set_item("model", &layout.model)?;
     state.set_item("parameters", &layout.parameters)?;
-    state.set_item("frame_period", layout.frame_period)?;
-    state.set_item("pixel_pitch", layout.pixel_pitch)?;
+    state.set_item("frame_period", layout.units.frame_period)?;
+    state.set_item("pixel_pitch", layout.units.pixel_pitch)?;
+    state.set_item("length_unit", &layout.units.length)?;
+    state.set_item("interval", layout.interval.name())?;
     match &layout.sites {
         SamplingGrid::Grid { region, stride } => {
             state.set_item("region", region.map(|r| (r.x, r.y, r.width, r.height)))?;
@@ -73,13 +75,19 @@ fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> Outcome<FlowField> {
             stride: required(state, "stride")?.extract()?,
         },
     };
+    let interval: String = required(state, "interval")?.extract()?;
+    let interval = Interval::ALL.into_iter().find(|known| known.name() == interval).unwrap_or_default();
     let layout = FieldLayout {
         frame_size: required(state, "frame_size")?.extract()?,
         sites,
         model: required(state, "model")?.extract()?,
         parameters: required(state, "parameters")?.extract()?,
-        frame_period: required(state, "frame_period")?.extract()?,
-        pixel_pitch: required(state, "pixel_pitch")?.extract()?,
+        units: Units {
+            pixel_pitch: required(state, "pixel_pitch")?.extract()?,
+            length: required(state, "length_unit")?.extract()?,
+            frame_period: required(state, "frame_period")?.extract()?,
+        },
+        interval,
         frame_index: required(state, "frame_index")?.extract()?,
         correlation_length: required(state, "correlation_length")?.extract()?,
     };

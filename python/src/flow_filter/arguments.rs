@@ -76,8 +76,7 @@ impl Arguments {
             sites: options::grid(py, &self.grid)?,
             mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
             covariance: self.covariance,
-            pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(base.pixel_pitch),
-            frame_period: options::frame_period(self.fps)?,
+            units: options::units(py, &self.pixel_pitch, self.length_unit.as_deref(), self.fps)?,
             threads: options::threads(self.threads)?,
             simd: options::simd(self.simd.as_deref())?,
         })

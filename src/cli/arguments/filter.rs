@@ -1,6 +1,6 @@
 //! Which flow filter, and its constants.
 
-use super::{method::rectangle, method::word, parse_pair, parse_positive, parse_size};
+use super::{UnitArguments, method::rectangle, method::word, parse_positive, parse_size};
 use crate::error::Result;
 use crate::temporal::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
 use clap::Args;
@@ -55,9 +55,8 @@ pub struct FilterArguments {
     /// Leave the covariance out: faster, smaller files
     #[arg(long)]
     pub no_covariance: bool,
-    /// Physical size of a pixel; flow then comes in that unit per frame
-    #[arg(long, value_name = "DX[,DY]", value_parser = parse_pair)]
-    pub pixel_pitch: Option<(f64, f64)>,
+    #[command(flatten)]
+    pub units: UnitArguments,
 }
 
 /// One number for each component of the state.
@@ -96,7 +95,6 @@ impl FilterArguments {
         points.kappa = self.kappa.unwrap_or(points.kappa);
         options.full_scale = self.full_scale.unwrap_or(if dtype == "uint16" { 65535.0 } else { 255.0 });
         options.covariance = !self.no_covariance;
-        options.pixel_pitch = self.pixel_pitch.unwrap_or((1.0, 1.0));
         Ok(options)
     }
 
@@ -116,7 +114,8 @@ impl FilterArguments {
             ("kappa", self.kappa.is_some()),
             ("full_scale", self.full_scale.is_some()),
             ("no_covariance", self.no_covariance),
-            ("pixel_pitch", self.pixel_pitch.is_some()),
+            ("pixel_pitch", self.units.pixel_pitch.is_some()),
+            ("length_unit", self.units.length_unit.is_some()),
         ];
         given.into_iter().find(|(_, given)| *given).map(|(name, _)| name)
     }

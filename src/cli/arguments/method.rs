@@ -1,6 +1,6 @@
 //! Which estimator, and its options.
 
-use super::{parse_not_negative, parse_pair, parse_positive, parse_size};
+use super::{UnitArguments, parse_not_negative, parse_positive, parse_size};
 use crate::error::Result;
 use crate::flow::{Method, MethodInfo, MethodSettings, PAIR};
 use crate::jet::Neighbourhood;
@@ -72,9 +72,8 @@ pub struct MethodArguments {
     /// Standard deviation of the pixel noise, grey levels [default: from the frames]
     #[arg(long, value_name = "LEVELS", value_parser = parse_not_negative)]
     pub noise: Option<f64>,
-    /// Physical size of a pixel; flow then comes in that unit per frame
-    #[arg(long, value_name = "DX[,DY]", value_parser = parse_pair)]
-    pub pixel_pitch: Option<(f64, f64)>,
+    #[command(flatten)]
+    pub units: UnitArguments,
 }
 
 /// `lucas-kanade` and `lucas_kanade` are the same word.

@@ -2,10 +2,14 @@
 //! with the standard deviation that the covariance of the motion gives it to first order, `sd^2 = grad^T
 //! Cov(m) grad`.
 //!
-//! `quantity` has the formulas, `value` their standard deviations; `region` (means) and `region_motion` (one
-//! affine fit) allow for `sharing`, the pixels that estimates have in common.
+//! `quantity` has the names and units, `rate` the rates that displacements stand for, `value` the formulas and
+//! their standard deviations. A region gives one number by its mean motion (`region`) or by the one affine
+//! motion that most of it follows (`dominant` finds it, `region_motion` fits it); both allow for `sharing`,
+//! the pixels that estimates have in common.
 
+mod dominant;
 mod quantity;
+mod rate;
 mod region;
 mod region_motion;
 mod sharing;
@@ -13,6 +17,6 @@ mod value;
 
 pub use quantity::Quantity;
 pub use region::{Aggregate, Mean, parameter_mean, plane, planes, region_mean};
-pub use region_motion::{RegionMotion, fit_region};
+pub use region_motion::{RegionMotion, RegionStatus, fit_region, measure, measure_parameter};
 pub use sharing::sharing;
-pub use value::value_and_std;
+pub use value::{Motion, unbiased_value_and_std, value_and_std};

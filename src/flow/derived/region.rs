@@ -1,9 +1,13 @@
 //! Derived quantities over a field, and their mean over a region.
 
-use super::{Quantity, sharing::in_common, sharing::sharing_among, value_and_std};
+use super::sharing::{in_common, sharing_among};
+use super::{Motion, Quantity, unbiased_value_and_std, value_and_std};
 use crate::error::{Error, Result};
 use crate::math::{MAD_TO_STD, Real, central_median};
-use crate::types::{FlowField, Rect, SamplingGrid};
+use crate::types::{FlowField, MOTION_NAMES, Region};
+
+/// Standard error of a median of normal values over that of their mean.
+const MEDIAN_EFFICIENCY: f64 = 1.2533;
 
 /// How the sites of a region are combined into one number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -11,8 +15,8 @@ pub enum Aggregate {
     /// Weighted by the inverse of each site's variance, which needs the field's covariance.
     #[default]
     InverseVariance,
-    /// The median, with 1.2533 times the standard error of the mean (its spread for normal errors) as
-    /// standard deviation, the spread taken from the median absolute deviation.
+    /// The median, whose standard deviation is that of the mean times 1.2533 (its spread for normal errors),
+    /// with the scatter taken from the median absolute deviation.
     Median,
 }
 
@@ -29,11 +33,8 @@ pub struct Mean {
     pub count: usize,
 }
 
-/// The point that site `index` stands for, in units of the pixel pitch.
-fn position<T: Real>(field: &FlowField<T>, index: usize) -> (f64, f64) {
-    let (x, y) = field.layout.sites.pixel(index % field.width, index / field.width);
-    let (dx, dy) = field.layout.pixel_pitch;
-    (x as f64 * dx, y as f64 * dy)
+impl Mean {
+    const UNKNOWN: Self = Self { value: f64::NAN, std: f64::NAN, count: 0 };
 }
 
 /// Values of a quantity at every site, row-major; NaN without estimate or Jacobian.
@@ -47,18 +48,17 @@ pub fn plane<T: Real>(field: &FlowField<T>, quantity: Quantity) -> Result<Vec<f6
 /// As [`plane()`], with the plane of standard deviations where the field has a covariance.
 pub fn planes<T: Real>(field: &FlowField<T>, quantity: Quantity) -> Result<(Vec<f64>, Option<Vec<f64>>)> {
     check(field, quantity)?;
-    let pairs: Vec<(f64, Option<f64>)> = (0..field.len()).map(|i| at_site(field, quantity, i)).collect();
-    let std = field.covariance.is_some().then(|| pairs.iter().map(|p| p.1.unwrap_or(f64::NAN)).collect());
-    Ok((pairs.into_iter().map(|p| p.0).collect(), std))
+    let pairs = (0..field.len()).map(|index| value_and_std(quantity, &Motion::at_site(field, index)));
+    let (values, std): (Vec<f64>, Vec<f64>) = pairs.map(|(value, std)| (value, std.unwrap_or(f64::NAN))).unzip();
+    Ok((values, field.covariance.is_some().then_some(std)))
 }
 
-fn check<T>(field: &FlowField<T>, quantity: Quantity) -> Result<()> {
-    if quantity.needs_fps() && field.layout.frame_period.is_none() {
-        return Err(Error::argument(
-            "quantity",
-            "a frame period (frames per second) to be given with rpm",
-            "a field without one",
-        ));
+/// # Errors
+/// [`Error::Argument`] naming `quantity` for one that the field cannot give.
+pub(super) fn check<T>(field: &FlowField<T>, quantity: Quantity) -> Result<()> {
+    if quantity.needs_fps() && field.layout.units.frame_period.is_none() {
+        let expected = "a frame period (frames per second) to be given with rpm";
+        return Err(Error::argument("quantity", expected, "a field without one"));
     }
     if quantity.needs_jacobian() && !field.layout.parameters.iter().any(|p| p == "u_x") {
         return Err(Error::argument(
@@ -70,24 +70,27 @@ fn check<T>(field: &FlowField<T>, quantity: Quantity) -> Result<()> {
     Ok(())
 }
 
-fn at_site<T: Real>(field: &FlowField<T>, quantity: Quantity, index: usize) -> (f64, Option<f64>) {
-    let m = field.affine(index).to_array().map(Real::to_f64);
-    value_and_std(quantity, m, field.covariance_at(index), position(field, index), field.layout.frame_period)
-}
-
-/// One value of a quantity for the sites inside `region` (pixels of the frame; `None`: all sites).
+/// One value of a quantity for the sites inside `region` (`None`: all sites): that of their mean motion, so
+/// that ratios, lengths and angles are formed after the mean is.
+///
+/// Sites are weighted by the inverse variance of what the quantity is a linear combination of, or of what it
+/// is formed of. What noise adds to the length of a vector is taken off.
 ///
 /// # Errors
-/// As [`plane()`]; [`Error::Argument`] naming `region` for one that leaves the frame, and `aggregate` for
-/// [`Aggregate::InverseVariance`] on a field without covariance.
+/// As [`plane()`]; [`Error::Argument`] naming `region` for one that does not fit the frame, and `aggregate`
+/// for [`Aggregate::InverseVariance`] on a field without covariance.
 pub fn region_mean<T: Real>(
     field: &FlowField<T>,
     quantity: Quantity,
-    region: Option<Rect>,
+    region: Option<&Region>,
     aggregate: Aggregate,
 ) -> Result<Mean> {
     check(field, quantity)?;
-    mean_of(field, (region, aggregate), |index| at_site(field, quantity, index))
+    let Some((motion, count)) = mean_motion(field, quantity.combinations(), (region, aggregate))? else {
+        return Ok(Mean::UNKNOWN);
+    };
+    let (value, std) = unbiased_value_and_std(quantity, &motion);
+    Ok(Mean { value, std: std.unwrap_or(f64::NAN), count })
 }
 
 /// One value of the parameter `name` (u, v, u_x, ...) for the sites inside `region`, as [`region_mean`].
@@ -97,75 +100,129 @@ pub fn region_mean<T: Real>(
 pub fn parameter_mean<T: Real>(
     field: &FlowField<T>,
     name: &str,
-    region: Option<Rect>,
+    region: Option<&Region>,
     aggregate: Aggregate,
 ) -> Result<Mean> {
-    let Some(plane) = field.plane(name) else {
-        return Err(Error::argument("name", format!("one of {}", field.layout.parameters.join(", ")), name));
+    let place = MOTION_NAMES.iter().position(|known| *known == name);
+    let Some(place) = place.filter(|_| field.plane(name).is_some()) else {
+        let known = field.layout.parameters.iter().filter(|p| MOTION_NAMES.contains(&p.as_str()));
+        let names: Vec<&str> = known.map(String::as_str).collect();
+        return Err(Error::argument("name", format!("one of {}", names.join(", ")), name));
     };
-    let std = field.standard_deviation(name);
-    mean_of(field, (region, aggregate), |index| (plane[index].to_f64(), std.as_ref().map(|std| std[index].to_f64())))
+    let itself = std::array::from_fn(|k| if k == place { 1.0 } else { 0.0 });
+    let Some((motion, count)) = mean_motion(field, &[itself], (region, aggregate))? else { return Ok(Mean::UNKNOWN) };
+    let variance = motion.covariance.map_or(f64::NAN, |c| c[place][place]);
+    Ok(Mean { value: motion.parameters[place], std: variance.sqrt(), count })
 }
 
-/// The mean of a value with its standard deviation.
-fn mean_of<T: Real>(
-    field: &FlowField<T>,
-    (region, aggregate): (Option<Rect>, Aggregate),
-    at: impl Fn(usize) -> (f64, Option<f64>),
-) -> Result<Mean> {
-    if aggregate == Aggregate::InverseVariance && field.covariance.is_none() {
-        return Err(Error::argument(
-            "aggregate",
-            "a field with covariance, or the median",
-            "a field without covariance",
-        ));
+/// The sites of `region`.
+///
+/// # Errors
+/// [`Error::Argument`] naming `region` for one that does not fit the frame.
+pub(super) fn sites_in<T: Real>(field: &FlowField<T>, region: Option<&Region>) -> Result<Vec<usize>> {
+    if let Some(region) = region {
+        region.check(field.layout.frame_size)?;
     }
-    if let Some(r) = region {
-        SamplingGrid::Grid { region: Some(r), stride: 1 }.shape(field.layout.frame_size)?;
-    }
-    let inside = |&index: &usize| {
+    let is_inside = |&index: &usize| {
         let (x, y) = field.layout.sites.pixel(index % field.width, index / field.width);
-        region.is_none_or(|r| x >= r.x && y >= r.y && x - r.x < r.width && y - r.y < r.height)
+        region.is_none_or(|region| region.contains(x, y))
     };
-    let known = |&index: &usize| field.status[index].is_valid();
-    let (used, sites): (Vec<usize>, Vec<(f64, Option<f64>)>) = (0..field.len())
-        .filter(inside)
-        .filter(known)
-        .map(|index| (index, at(index)))
-        .filter(|(_, (value, _))| value.is_finite())
-        .unzip();
-    let sharing = sharing_among(&field.layout, field.width, &used);
+    Ok((0..field.len()).filter(is_inside).collect())
+}
+
+/// The mean motion of a region for what is formed of `combinations`, and the number of sites that took part.
+fn mean_motion<'a, T: Real>(
+    field: &'a FlowField<T>,
+    combinations: &[[f64; 6]],
+    (region, aggregate): (Option<&Region>, Aggregate),
+) -> Result<Option<(Motion<'a>, usize)>> {
+    if aggregate == Aggregate::InverseVariance && field.covariance.is_none() {
+        let expected = "a field with covariance, or the median";
+        return Err(Error::argument("aggregate", expected, "a field without covariance"));
+    }
+    let mut used = sites_in(field, region)?;
+    used.retain(|&index| field.status[index].is_valid() && field.affine(index).to_array().iter().all(|m| m.finite()));
     Ok(match aggregate {
-        Aggregate::InverseVariance => weighted(&sites, sharing),
-        Aggregate::Median => median_of(sites.into_iter().map(|s| s.0).collect(), sharing),
+        Aggregate::InverseVariance => weighted(field, &used, combinations),
+        Aggregate::Median => median(field, &used),
     })
 }
 
-fn weighted(sites: &[(f64, Option<f64>)], sharing: f64) -> Mean {
-    let known: Vec<(f64, f64)> =
-        sites.iter().filter_map(|&(v, s)| s.filter(|s| s.is_finite()).map(|s| (v, s * s))).collect();
-    // Estimates that claim no error at all (exact data) outweigh the rest and share the weight equally.
-    let exact: Vec<(f64, f64)> = known.iter().filter(|k| k.1 == 0.0).map(|k| (k.0, 1.0)).collect();
-    let all_exact = !exact.is_empty();
-    let used = if all_exact { exact } else { known };
-    let weight: f64 = used.iter().map(|k| 1.0 / k.1).sum();
-    let value = used.iter().map(|k| k.0 / k.1).sum::<f64>() / weight;
-    let scatter: f64 = used.iter().map(|k| (k.0 - value).powi(2) / k.1).sum();
-    // The larger of the claimed and the observed spread (Birge 1932).
-    let ratio = if used.len() > 1 { scatter / (used.len() - 1) as f64 } else { 1.0 };
-    let common = if all_exact { 0.0 } else { in_common(ratio, (used.len(), 1), sharing) };
-    let ratio = if all_exact { ratio } else { ratio.max(1.0) };
-    // What all have in common does not shrink with their number.
-    let variance = (sharing * ratio * (1.0 - common) + common * used.len() as f64) / weight;
-    Mean { value, std: variance.sqrt(), count: used.len() }
+/// `a^T C a`.
+fn along(a: &[f64; 6], c: &[[f64; 6]; 6]) -> f64 {
+    (0..6).map(|i| a[i] * (0..6).map(|j| c[i][j] * a[j]).sum::<f64>()).sum()
 }
 
-fn median_of(mut values: Vec<f64>, sharing: f64) -> Mean {
-    let count = values.len();
-    let Some(value) = central_median(&mut values) else {
-        return Mean { value: f64::NAN, std: f64::NAN, count };
+fn weighted<'a, T: Real>(
+    field: &'a FlowField<T>,
+    used: &[usize],
+    combinations: &[[f64; 6]],
+) -> Option<(Motion<'a>, usize)> {
+    let claimed = |&index: &usize| -> f64 {
+        let covariance = field.covariance_at(index);
+        covariance.map_or(f64::NAN, |c| combinations.iter().map(|a| along(a, &c)).sum())
     };
-    let mut deviations: Vec<f64> = values.iter().map(|v| (v - value).abs()).collect();
-    let spread = MAD_TO_STD * central_median(&mut deviations).unwrap_or(f64::NAN);
-    Mean { value, std: 1.2533 * spread * (sharing / count as f64).sqrt(), count }
+    let known: Vec<(usize, f64)> =
+        used.iter().map(|index| (*index, claimed(index))).filter(|(_, variance)| variance.is_finite()).collect();
+    // Estimates that claim no error at all (exact data) outweigh the rest and share the weight equally.
+    let is_exact = known.iter().any(|(_, variance)| *variance == 0.0);
+    let sites: Vec<(usize, f64)> = known
+        .into_iter()
+        .filter(|(_, variance)| !is_exact || *variance == 0.0)
+        .map(|(index, variance)| (index, if is_exact { 1.0 } else { 1.0 / variance }))
+        .collect();
+    let total: f64 = sites.iter().map(|(_, weight)| weight).sum();
+    let (mut parameters, mut at) = ([0.0; 6], (0.0, 0.0));
+    for &(index, weight) in &sites {
+        let motion = Motion::at_site(field, index);
+        let share = weight / total;
+        parameters.iter_mut().zip(motion.parameters).for_each(|(sum, value)| *sum += share * value);
+        (at.0, at.1) = (at.0 + share * motion.at.0, at.1 + share * motion.at.1);
+    }
+    // Mean squares about the mean, and mean of the claimed covariances.
+    let (mut spread, mut covariance) = ([[0.0; 6]; 6], [[0.0; 6]; 6]);
+    for &(index, weight) in &sites {
+        let motion = Motion::at_site(field, index);
+        let share = weight / total;
+        let off: [f64; 6] = std::array::from_fn(|p| motion.parameters[p] - parameters[p]);
+        for i in 0..6 {
+            for j in 0..6 {
+                spread[i][j] += share * off[i] * off[j];
+                covariance[i][j] += share * motion.covariance.map_or(0.0, |c| c[i][j]);
+            }
+        }
+    }
+    let (count, n) = (sites.len(), sites.len() as f64);
+    let indices: Vec<usize> = sites.iter().map(|(index, _)| *index).collect();
+    let sharing = sharing_among(&field.layout, field.width, &indices);
+    // The larger of the claimed and the observed spread (Birge 1932).
+    let scatter: f64 = combinations.iter().map(|a| along(a, &spread)).sum::<f64>() * total;
+    let ratio = if count > 1 { scatter / (n - 1.0) } else { 1.0 };
+    let common = if is_exact { 0.0 } else { in_common(ratio, (count, combinations.len()), sharing) };
+    // What all have in common does not shrink with their number.
+    let factor = if is_exact { sharing / n } else { sharing * ratio.max(1.0) * (1.0 - common) / n + common };
+    let of_mean = if is_exact { spread } else { covariance };
+    let motion = Motion {
+        parameters,
+        covariance: Some(of_mean.map(|row| row.map(|value| factor * value))),
+        at,
+        ..Motion::at_site(field, *indices.first()?)
+    };
+    Some((motion, count))
+}
+
+/// The median of each parameter, with independent standard deviations.
+fn median<'a, T: Real>(field: &'a FlowField<T>, used: &[usize]) -> Option<(Motion<'a>, usize)> {
+    let first = Motion::at_site(field, *used.first()?);
+    let middle = |value: &dyn Fn(Motion<'_>) -> f64| {
+        let mut values: Vec<f64> = used.iter().map(|&index| value(Motion::at_site(field, index))).collect();
+        central_median(&mut values).unwrap_or(f64::NAN)
+    };
+    let parameters: [f64; 6] = std::array::from_fn(|p| middle(&|motion| motion.parameters[p]));
+    let sharing = sharing_among(&field.layout, field.width, used);
+    let shrink = MEDIAN_EFFICIENCY * MAD_TO_STD * (sharing / used.len() as f64).sqrt();
+    let variance = |p: usize| (shrink * middle(&|motion| (motion.parameters[p] - parameters[p]).abs())).powi(2);
+    let covariance = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { variance(i) } else { 0.0 }));
+    let at = (middle(&|motion| motion.at.0), middle(&|motion| motion.at.1));
+    Some((Motion { parameters, covariance: Some(covariance), at, ..first }, used.len()))
 }

@@ -1,56 +1,195 @@
 //! One affine motion for a whole region, from the estimates of its sites.
 
-use super::{sharing, sharing::in_common};
+use super::region::sites_in;
+use super::sharing::{in_common, sharing_among};
+use super::{Motion, Quantity, dominant::dominant_motion, region, unbiased_value_and_std};
+use crate::error::{Error, Result};
 use crate::math::Real;
-use crate::types::{FlowField, Rect, SamplingGrid};
-use nalgebra::{DMatrix, DVector, Matrix6, SMatrix, Vector6};
+use crate::types::{FlowField, MOTION_NAMES, Region, choices};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, SMatrix, Vector2, Vector3, Vector6};
 
-/// Variance added to every estimate, (px/frame)^2 and 1/frame^2: no estimate is taken for exact.
+/// Variance added to every estimate, in squares of px/frame and 1/frame: no estimate is taken for exact.
 const FLOOR: f64 = 1e-14;
+
+/// Whether a region has the motion that was asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RegionStatus {
+    /// More than half of its sites follow one affine motion, or the site at the given point does.
+    Ok,
+    /// No motion is that of most sites, or the site at the given point differs from its neighbours.
+    NoDominantMotion,
+    /// Too few valid sites to determine an affine motion.
+    TooFewSites,
+}
+
+choices!(RegionStatus: Ok "ok", NoDominantMotion "no_dominant_motion", TooFewSites "too_few_sites");
 
 /// The motion of a region about its centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RegionMotion {
-    /// `(u, v, u_x, v_x, u_y, v_y)` at the centre, units of the field.
+    /// `(u, v, u_x, v_x, u_y, v_y)` at the centre, in the units of the field; NaN unless the status is `Ok`.
     pub motion: [f64; 6],
     /// Covariance of the motion.
     pub covariance: [[f64; 6]; 6],
-    /// The centre in pixels.
+    /// The centre of the region's sites in pixels.
     pub centre: (f64, f64),
-    /// Sites that took part.
+    /// Sites that follow the motion.
     pub count: usize,
-    /// SamplingGrid in the region.
+    /// Sites in the region with a valid estimate.
+    pub valid: usize,
+    /// Sites in the region with an estimate, those included that the frames contradict.
+    pub estimated: usize,
+    /// Sites in the region.
     pub sites: usize,
+    /// Whether the motion can be used.
+    pub status: RegionStatus,
 }
 
 impl RegionMotion {
-    /// Share of the region's sites that took part, 0 to 1.
+    /// Share of the sites with an estimate that follow the motion, 0 to 1. A site that the frames contradict
+    /// follows none.
+    pub fn share(&self) -> f64 {
+        self.count as f64 / self.estimated.max(1) as f64
+    }
+
+    /// Share of the region's sites that have a valid estimate, 0 to 1.
     pub fn valid_share(&self) -> f64 {
-        if self.sites == 0 { 0.0 } else { self.count as f64 / self.sites as f64 }
+        self.valid as f64 / self.sites.max(1) as f64
     }
 }
 
-/// Fits one affine motion `m0` about the centre to the estimates `m_i` (covariance `C_i`) of a field's valid
-/// sites: `min sum (m_i - T_i m0)^T C_i^-1 (m_i - T_i m0)`, where `T_i` carries the affine motion from the
-/// centre to the site.
+/// The flow of a site in px/frame, at its place from the centre in px.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Site {
+    index: usize,
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) flow: Vector2<f64>,
+    pub(super) covariance: Matrix2<f64>,
+}
+
+impl Site {
+    pub(super) fn place(&self) -> Vector3<f64> {
+        Vector3::new(1.0, self.x, self.y)
+    }
+}
+
+/// Value of a quantity for the motion of a region, with its standard deviation; see [`fit_region`].
 ///
-/// Estimates of neighbouring sites share pixels; the covariance is enlarged by [`sharing`](super::sharing).
+/// # Errors
+/// [`Error::Argument`] naming `quantity` for one that the field cannot give, and as [`fit_region`].
+pub fn measure<T: Real>(field: &FlowField<T>, quantity: Quantity, fit: &RegionMotion) -> Result<(f64, f64)> {
+    region::check(field, quantity)?;
+    let (dx, dy) = field.layout.units.pixel_pitch;
+    let motion = Motion {
+        parameters: fit.motion,
+        covariance: Some(fit.covariance),
+        at: (fit.centre.0 * dx, fit.centre.1 * dy),
+        interval: field.layout.interval,
+        units: &field.layout.units,
+    };
+    let (value, std) = unbiased_value_and_std(quantity, &motion);
+    Ok((value, std.unwrap_or(f64::NAN)))
+}
+
+/// The parameter at `place` among `(u, v, u_x, v_x, u_y, v_y)` for the motion of a region at its centre, with
+/// its standard deviation.
+pub fn measure_parameter(place: usize, fit: &RegionMotion) -> (f64, f64) {
+    (fit.motion[place], fit.covariance[place][place].sqrt())
+}
+
+/// Fits one affine motion `m0` about the centre to the estimates `m_i` (covariance `C_i`) of the valid sites
+/// in `region` (`None`: all) that follow the motion of most of them, or with `seed`, a pixel `(x, y)`, that of
+/// the sites around it: `min sum (m_i - T_i m0)^T C_i^-1 (m_i - T_i m0)`, where `T_i` carries the affine
+/// motion from the centre to the site.
+///
+/// Estimates of neighbouring sites share pixels; the covariance is enlarged by [`sharing`](super::sharing()).
 /// Where the estimates scatter more than their covariances allow, it is enlarged by that ratio too (R. T.
-/// Birge, "The calculation of errors by the method of least squares", 1932), so that a region that does not
-/// move as one affine motion shows in the standard deviation. Where they scatter less, they have an error in
-/// common, which does not shrink with their number: the covariance holds it in full.
+/// Birge, "The calculation of errors by the method of least squares", 1932). Where they scatter less, they
+/// have an error in common, which does not shrink with their number: the covariance holds it in full.
 ///
-/// The motion is NaN where the field has no covariance or the sites do not determine six parameters.
-pub fn fit_region<T: Real>(field: &FlowField<T>) -> RegionMotion {
-    let centre = centre_of(field);
-    let (dx, dy) = field.layout.pixel_pitch;
+/// # Errors
+/// [`Error::Argument`] naming `region` or `seed` where they do not fit the frame, `covariance` for a field
+/// without one.
+pub fn fit_region<T: Real>(
+    field: &FlowField<T>,
+    region: Option<&Region>,
+    seed: Option<(f64, f64)>,
+) -> Result<RegionMotion> {
+    if field.covariance.is_none() {
+        return Err(Error::argument("field", "one with covariance", "one without"));
+    }
+    let (width, height) = field.layout.frame_size;
+    if let Some((x, y)) = seed
+        && !(x >= 0.0 && y >= 0.0 && x <= (width - 1) as f64 && y <= (height - 1) as f64)
+    {
+        let expected = format!("a pixel (x, y) inside the {width} x {height} frame");
+        return Err(Error::argument("seed", expected, format!("({x}, {y})")));
+    }
+    let pixel = |index: usize| {
+        let (x, y) = field.layout.sites.pixel(index % field.width, index / field.width);
+        (x as f64, y as f64)
+    };
+    let inside = sites_in(field, region)?;
+    let n = inside.len().max(1) as f64;
+    let sum = inside.iter().map(|&index| pixel(index)).fold((0.0, 0.0), |sum, at| (sum.0 + at.0, sum.1 + at.1));
+    let centre = (sum.0 / n, sum.1 / n);
+    let scale = [field.layout.units.scale("u"), field.layout.units.scale("v")];
+    let sites: Vec<Site> = inside
+        .iter()
+        .filter(|&&index| field.status[index].is_valid())
+        .filter_map(|&index| {
+            let motion = Motion::at_site(field, index);
+            let covariance = motion.covariance?;
+            let per = |i: usize, j: usize| covariance[i][j] / (scale[i] * scale[j]);
+            let covariance = Matrix2::new(per(0, 0) + FLOOR, per(0, 1), per(1, 0), per(1, 1) + FLOOR);
+            let flow = Vector2::new(motion.parameters[0] / scale[0], motion.parameters[1] / scale[1]);
+            let (x, y) = pixel(index);
+            let is_known = covariance.iter().chain(flow.iter()).all(|value| value.is_finite());
+            is_known.then_some(Site { index, x: x - centre.0, y: y - centre.1, flow, covariance })
+        })
+        .collect();
+    let unknown = RegionMotion {
+        motion: [f64::NAN; 6],
+        covariance: [[f64::NAN; 6]; 6],
+        centre,
+        count: 0,
+        valid: sites.len(),
+        estimated: inside.iter().filter(|&&index| field.status[index].has_estimate()).count(),
+        sites: inside.len(),
+        status: RegionStatus::TooFewSites,
+    };
+    let nearest = |(x, y): (f64, f64)| {
+        let from = |site: &Site| (site.x + centre.0 - x).hypot(site.y + centre.1 - y);
+        (0..sites.len()).min_by(|&a, &b| from(&sites[a]).total_cmp(&from(&sites[b])))
+    };
+    let seed = seed.and_then(nearest);
+    let Some(dominant) = dominant_motion(&sites, seed) else { return Ok(unknown) };
+    let followers: Vec<usize> = sites.iter().filter(|site| dominant.holds(site)).map(|site| site.index).collect();
+    let count = followers.len();
+    let is_found = seed.map_or(2 * count > unknown.estimated, |seed| dominant.holds(&sites[seed]));
+    if !is_found {
+        return Ok(RegionMotion { count, status: RegionStatus::NoDominantMotion, ..unknown });
+    }
+    let Some((motion, covariance)) = least_squares(field, &followers, centre) else { return Ok(unknown) };
+    Ok(RegionMotion { motion, covariance, count, status: RegionStatus::Ok, ..unknown })
+}
+
+/// The weighted fit to the sites `used`, with its covariance.
+fn least_squares<T: Real>(
+    field: &FlowField<T>,
+    used: &[usize],
+    centre: (f64, f64),
+) -> Option<([f64; 6], [[f64; 6]; 6])> {
+    let (dx, dy) = field.layout.units.pixel_pitch;
     let observed: Vec<usize> = observed_parameters(field);
+    let floor = MOTION_NAMES.map(|name| FLOOR * field.layout.units.scale(name).powi(2));
     let (mut normal, mut right, mut square, mut count) = (Matrix6::zeros(), Vector6::zeros(), 0.0, 0);
     // Sums of the weights, and of what they make of an error that all sites have in common.
     let mut weights = DMatrix::zeros(observed.len(), observed.len());
     let mut passed = DMatrix::zeros(6, observed.len());
-    for site in (0..field.len()).filter(|&site| field.status[site].is_valid()) {
-        let Some(weight) = inverse_covariance(field, site, &observed) else { continue };
+    for &site in used {
+        let Some(weight) = inverse_covariance(field, site, &observed, &floor) else { continue };
         let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
         let carry = carry_to((x as f64 - centre.0) * dx, (y as f64 - centre.1) * dy);
         let rows = carry.select_rows(observed.iter());
@@ -64,13 +203,11 @@ pub fn fit_region<T: Real>(field: &FlowField<T>) -> RegionMotion {
         square += (value.transpose() * &weight * &value)[0];
         count += 1;
     }
-    let unknown =
-        RegionMotion { motion: [f64::NAN; 6], covariance: [[f64::NAN; 6]; 6], centre, count, sites: field.len() };
-    let Some(inverse) = invert_scaled(&normal) else { return unknown };
+    let inverse = invert_scaled(&normal)?;
     let motion = inverse * right;
     let freedom = (count * observed.len()) as f64 - 6.0;
     let scatter = if freedom > 0.0 { (square - right.dot(&motion)) / freedom } else { 1.0 };
-    let sharing = sharing(&field.layout);
+    let sharing = sharing_among(&field.layout, field.width, used);
     let common = in_common(scatter, (count, observed.len()), sharing);
     let mut covariance = inverse * (scatter.max(1.0) * sharing * (1.0 - common));
     if let Some(claimed) = weights.try_inverse() {
@@ -78,7 +215,7 @@ pub fn fit_region<T: Real>(field: &FlowField<T>) -> RegionMotion {
         let whole = &passed * claimed * passed.transpose() * (common * count as f64);
         covariance += Matrix6::from_fn(|i, j| whole[(i, j)]);
     }
-    RegionMotion { motion: motion.into(), covariance: covariance.transpose().into(), ..unknown }
+    Some((motion.into(), covariance.transpose().into()))
 }
 
 /// `(u, v, ...)(p) = T m0` at the offset `(dx, dy)`.
@@ -92,13 +229,19 @@ fn carry_to(dx: f64, dy: f64) -> SMatrix<f64, 6, 6> {
 /// Which of the six parameters the model estimates.
 fn observed_parameters<T: Real>(field: &FlowField<T>) -> Vec<usize> {
     let known = |name: &str| field.layout.parameters.iter().any(|parameter| parameter == name);
-    (0..6).filter(|&k| known(crate::types::MOTION_NAMES[k])).collect()
+    (0..6).filter(|&k| known(MOTION_NAMES[k])).collect()
 }
 
-fn inverse_covariance<T: Real>(field: &FlowField<T>, site: usize, observed: &[usize]) -> Option<DMatrix<f64>> {
+fn inverse_covariance<T: Real>(
+    field: &FlowField<T>,
+    site: usize,
+    observed: &[usize],
+    floor: &[f64; 6],
+) -> Option<DMatrix<f64>> {
     let covariance = field.covariance_at(site)?;
     let n = observed.len();
-    let matrix = DMatrix::from_fn(n, n, |i, j| covariance[observed[i]][observed[j]] + if i == j { FLOOR } else { 0.0 });
+    let entry = |i: usize, j: usize| covariance[i][j] + if i == j { floor[i] } else { 0.0 };
+    let matrix = DMatrix::from_fn(n, n, |i, j| entry(observed[i], observed[j]));
     matrix.iter().all(|value| value.is_finite()).then_some(())?;
     matrix.cholesky().map(|factor| factor.inverse())
 }
@@ -112,20 +255,4 @@ fn invert_scaled(matrix: &Matrix6<f64>) -> Option<Matrix6<f64>> {
     let scaled = Matrix6::from_fn(|i, j| matrix[(i, j)] * scale[i] * scale[j]);
     let inverse = scaled.cholesky()?.inverse();
     Some(Matrix6::from_fn(|i, j| inverse[(i, j)] * scale[i] * scale[j]))
-}
-
-/// The middle of the sites in pixels; of points, their mean.
-fn centre_of<T>(field: &FlowField<T>) -> (f64, f64) {
-    match &field.layout.sites {
-        SamplingGrid::Grid { region, .. } => {
-            let (width, height) = field.layout.frame_size;
-            let r = region.unwrap_or(Rect { x: 0, y: 0, width, height });
-            (r.x as f64 + (r.width as f64 - 1.0) / 2.0, r.y as f64 + (r.height as f64 - 1.0) / 2.0)
-        }
-        SamplingGrid::Points(points) => {
-            let n = points.len().max(1) as f64;
-            let sum = points.iter().fold((0.0, 0.0), |(x, y), point| (x + point.0 as f64, y + point.1 as f64));
-            (sum.0 / n, sum.1 / n)
-        }
-    }
 }

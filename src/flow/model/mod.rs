@@ -45,28 +45,6 @@ impl Parameter {
     pub const fn new(name: &'static str, of: Axis, per: Per) -> Self {
         Self { name, of, per }
     }
-
-    /// Its unit for a pixel pitch of 1 px.
-    pub fn unit(self) -> &'static str {
-        match self.per {
-            Per::Nothing => "px/frame",
-            Per::X | Per::Y => "1/frame",
-            Per::Frame => "px/frame^2",
-        }
-    }
-
-    /// Factor from px to units of the pixel pitch `(dx, dy)`.
-    pub fn scale(self, (dx, dy): (f64, f64)) -> f64 {
-        let length = match self.of {
-            Axis::X => dx,
-            Axis::Y => dy,
-        };
-        match self.per {
-            Per::Nothing | Per::Frame => length,
-            Per::X => length / dx,
-            Per::Y => length / dy,
-        }
-    }
 }
 
 /// A motion model with P unknowns and N equations linear in the jet and its time derivatives.

@@ -101,7 +101,7 @@ pub struct ContactMap {
 /// Where the motion has no translation all times are infinite.
 ///
 /// # Errors
-/// [`Error::Argument`](crate::Error::Argument) for a field without covariance or with a pixel pitch.
+/// [`Error::Argument`](crate::Error::Argument) for a field without covariance.
 pub fn contact_map<T: Real>(
     field: &FlowField<T>,
     camera: &Intrinsics,
@@ -109,6 +109,7 @@ pub fn contact_map<T: Real>(
     placement: Placement,
 ) -> Result<ContactMap> {
     check_field(field)?;
+    let field = &*field.in_pixels_and_frames();
     let (rates, motion) = (Rates::new(known), &known.motion);
     let turning = motion.translation[0].is_nan() && motion.rotation[0].is_finite();
     let turn = (placement == Placement::Midpoint).then(|| motion.derotation());

@@ -121,10 +121,11 @@ pub fn estimate_field_motion<T: Real>(
 /// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions). A list of points is taken whole.
 ///
 /// # Errors
-/// [`Error::Argument`](crate::error::Error::Argument) for a field without covariance or with a pixel pitch,
-/// and for a spacing that is not positive.
+/// [`Error::Argument`](crate::error::Error::Argument) for a field without covariance, and for a
+/// spacing that is not positive.
 pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Result<FieldPoints> {
     check_field(field)?;
+    let field = &*field.in_pixels_and_frames();
     let correlation_length = field.layout.correlation_length;
     let mut spacing = options.spacing.unwrap_or(MIN_SPACING.max(DEFAULT_SPACING * correlation_length));
     refuse_if(!(spacing.is_finite() && spacing > 0.0), "spacing", "a positive number", spacing)?;

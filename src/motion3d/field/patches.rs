@@ -47,10 +47,11 @@ impl FieldPatches {
 /// are larger than the pixels' covariances allow, as over an edge in depth.
 ///
 /// # Errors
-/// [`Error::Argument`](crate::error::Error::Argument) naming `field` for one without covariance, without a
-/// Jacobian or with a pixel pitch, and `patches` for a size below 8 px.
+/// [`Error::Argument`](crate::error::Error::Argument) naming `field` for one without covariance or
+/// Jacobian, and `patches` for a size below 8 px.
 pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<Rect>) -> Result<FieldPatches> {
     check_field(field)?;
+    let field = &*field.in_pixels_and_frames();
     let missing = MOTION_NAMES.iter().find(|&&name| !field.layout.parameters.iter().any(|own| own == name));
     let got = format!("a field without {}", missing.unwrap_or(&""));
     refuse_if(missing.is_some(), "field", "flow with its Jacobian", got)?;

@@ -147,11 +147,9 @@ pub(crate) fn check_noise_std(noise_std: f64) -> Result<()> {
     refuse_if(!is_usable, "noise_std", "a positive number between 1e-75 and 1e75", noise_std)
 }
 
-/// Whether a field has covariances and is in px.
+/// Whether a field has covariances.
 pub(crate) fn check_field<T>(field: &FlowField<T>) -> Result<()> {
-    refuse_if(field.covariance.is_none(), "field", "one with a covariance", "one without")?;
-    let pitch = field.layout.pixel_pitch;
-    refuse_if(pitch != (1.0, 1.0), "field", "flow in px", format!("the pixel pitch {pitch:?}"))
+    refuse_if(field.covariance.is_none(), "field", "one with a covariance", "one without")
 }
 
 /// The flow and its covariance at a valid site.

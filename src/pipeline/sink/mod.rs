@@ -9,7 +9,7 @@ mod table;
 
 pub use egomotion::{Egomotion, EgomotionPlan};
 pub use fields::Fields;
-pub use measurements::Measurements;
+pub use measurements::{MeasuredRegion, Measurements};
 pub use memory::Collect;
 pub use pictures::{PictureRanges, Pictures};
 pub(in crate::pipeline) use table::end_table;

@@ -63,20 +63,17 @@ impl Pictures {
     }
 
     fn quiver<T: Real>(&mut self, field: &FlowField<T>, frame: &Frame<T>) -> Result<Picture> {
+        let scale = field.layout.units.scale("u");
+        let field = &*field.in_pixels_and_frames();
         let (u, v) = flow_planes(field);
         let stride = stride(field);
         let (x, y) = field.layout.sites.pixel(0, 0);
         let spacing = (ARROW_SPACING / stride).max(1);
         let size = (field.width, field.height);
-        let mut arrows = arrows_on_grid(u, v, size, spacing, (x as f64, y as f64), stride as f64)?;
-        let (dx, dy) = field.layout.pixel_pitch;
-        for arrow in &mut arrows {
-            arrow.u /= dx;
-            arrow.v /= dy;
-        }
+        let arrows = arrows_on_grid(u, v, size, spacing, (x as f64, y as f64), stride as f64)?;
         if self.arrow_scale.is_none() && is_known(u) {
             self.arrow_scale = Some(match self.ranges.speed {
-                Some(speed) => Quiver::default().longest * dx / speed,
+                Some(speed) => Quiver::default().longest * scale / speed,
                 None => Quiver::default().resolve_scale(&arrows),
             });
         }

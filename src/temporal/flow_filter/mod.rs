@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::jet::JetStencil;
 use crate::parallel::Threads;
 use crate::simd::{Level, SimdReal};
-use crate::types::{FieldLayout, FlowField, Frame, MOTION_NAMES, Status};
+use crate::types::{FieldLayout, FlowField, Frame, Interval, MOTION_NAMES, Status};
 use pass::{COVARIANCE, Mark, PAIRS, RESIDUAL, Rows};
 use rayon::prelude::*;
 
@@ -155,8 +155,8 @@ impl<T: SimdReal> FlowFilter<T> {
             sites: options.sites.clone(),
             model: "affine".into(),
             parameters: MOTION_NAMES.map(String::from).to_vec(),
-            frame_period: options.frame_period,
-            pixel_pitch: options.pixel_pitch,
+            units: options.units.clone(),
+            interval: Interval::Instant,
             frame_index: self.frames - 1,
             correlation_length: options.neighbourhood.spread(),
         };
@@ -187,9 +187,7 @@ impl<T: SimdReal> FlowFilter<T> {
                 }
             }
         };
-        // Flow in units of the pixel pitch: u dx, v dy, u_x, v_x dy/dx, u_y dx/dy, v_y.
-        let (dx, dy) = options.pixel_pitch;
-        let units = [dx, dy, 1.0, dy / dx, dx / dy, 1.0];
+        let units = MOTION_NAMES.map(|name| options.units.scale(name));
         field.motion.par_chunks_exact_mut(n).enumerate().for_each(|(k, plane)| fill(plane, k, units[k]));
         if let Some(covariance) = &mut field.covariance {
             covariance.par_chunks_exact_mut(n).zip(&PAIRS[..]).enumerate().for_each(|(k, (plane, &(a, b)))| {

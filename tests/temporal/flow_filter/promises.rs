@@ -82,8 +82,7 @@ fn options_survive_saving() {
         adaptive: false,
         transition: Transition::Exact,
         simd: Some(Level::SCALAR),
-        pixel_pitch: (0.5, 0.25),
-        frame_period: Some(0.04),
+        units: Units::new((0.5, 0.25), Some("mm"), Some(0.04)),
         ..FlowFilterOptions::measured()
     };
     let mut filter = FlowFilter::<f32>::new((20, 12), options).unwrap();
@@ -200,7 +199,7 @@ fn grey_scale_pitch_and_covariance_are_in_their_units() {
     let frames: Vec<_> = (0..4).map(|t| texture(16, 16, t)).collect();
     let sites = SamplingGrid::Points(vec![(8, 8)]);
     let options = FlowFilterOptions { sites, covariance: true, adaptive: false, ..FlowFilterOptions::patent() };
-    let scaled = FlowFilterOptions { full_scale: 1.0, pixel_pitch: (2.0, 0.5), ..options.clone() };
+    let scaled = FlowFilterOptions { full_scale: 1.0, units: Units::new((2.0, 0.5), None, None), ..options.clone() };
     let mut a = FlowFilter::<f64>::new((16, 16), options).unwrap();
     let mut b = FlowFilter::<f64>::new((16, 16), scaled).unwrap();
     let mut last = None;
@@ -253,7 +252,7 @@ fn unusable_options_and_frames_are_named() {
         (FlowFilterOptions { full_scale: f64::NAN, ..patent() }, "full_scale"),
         (FlowFilterOptions { mask: Some(Mask::filled(3, 3, true)), ..patent() }, "mask"),
         (FlowFilterOptions { sites: SamplingGrid::Points(vec![(9, 0)]), ..patent() }, "points"),
-        (FlowFilterOptions { pixel_pitch: (0.0, 1.0), ..patent() }, "pixel_pitch"),
+        (FlowFilterOptions { units: Units::new((0.0, 1.0), None, None), ..patent() }, "pixel_pitch"),
     ] {
         let text = message((8, 8), options);
         assert!(text.starts_with(name), "{text}");
