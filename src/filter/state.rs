@@ -112,12 +112,11 @@ impl GaussianState {
                 failures.add(item, Error::Numerical(reason));
                 continue;
             }
-            match covariance_root(P, n, &mut root) {
-                Some(repaired) => repairs += u64::from(repaired),
-                None => {
-                    let reason = format!("P of state {item} has no positive semi-definite repair");
-                    failures.add(item, Error::Numerical(reason));
-                }
+            if let Some(repaired) = covariance_root(P, n, &mut root) {
+                repairs += u64::from(repaired);
+            } else {
+                let reason = format!("P of state {item} has no positive semi-definite repair");
+                failures.add(item, Error::Numerical(reason));
             }
         }
         failures.check()?;

@@ -183,8 +183,8 @@ fn singular_cholesky(a: &[f64], n: usize, l: &mut [f64]) -> bool {
         }
         let row: f64 = l[j * n..j * n + j].iter().map(|v| v * v).sum();
         let pivot = variance - row;
-        // Also false for a negative variance.
-        if !(pivot >= -rounding * variance) {
+        // Also where the variance itself is negative.
+        if pivot.is_nan() || pivot < -rounding * variance {
             return false;
         }
         let root = pivot.max(rounding * variance).sqrt();
