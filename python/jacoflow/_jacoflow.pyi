@@ -105,6 +105,8 @@ _Precision: TypeAlias = Literal["float32", "float64"]
 _Simd: TypeAlias = Literal["scalar", "avx2", "avx512"]
 _Progress: TypeAlias = bool | Callable[[int, int], object]
 _Callback: TypeAlias = Callable[..., ArrayLike]
+_Function: TypeAlias = Callable[[NDArray[np.float64], NDArray[np.float64]], ArrayLike]
+_Items: TypeAlias = Sequence[ArrayLike | None] | NDArray[Any]
 
 class JacoflowError(Exception):
     """Base class of the errors that are jacoflow's own (bad arguments are ValueError or TypeError, files OSError)."""
@@ -654,6 +656,10 @@ class GaussianFilter:
     changed in place; a number given for P, Q or R means that multiple of the identity. ValueError for an x
     that is not finite and for a P, Q or R that is not finite, symmetric and positive semi-definite, when it
     is set or, changed in place, at the next step. Units are the state's and the measurement's own.
+
+    A state that cannot make a step is left as it was and marked in `failed`; an error is raised only when all
+    are. For angles and other quantities that are no vectors, `residual_x`, `residual_z` and `state_add`
+    replace differences and sums; None means those of vectors. Like all functions they are vectorised.
     """
     @property
     def x(self) -> NDArray[np.float64]:
@@ -677,8 +683,8 @@ class GaussianFilter:
     def R(self, value: ArrayLike, /) -> None: ...
     @property
     def y(self) -> NDArray[np.float64]:
-        """Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where the
-        measurement was missing."""
+        """Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where a component
+        was missing, as in S and K."""
     @property
     def S(self) -> NDArray[np.float64]:
         """Covariance of the residual, array (m, m) or (B, m, m), in the measurement's units squared."""
@@ -687,7 +693,16 @@ class GaussianFilter:
         """Gain of the last update, array (n, m) or (B, n, m), state units per measurement unit."""
     @property
     def log_likelihood(self) -> NDArray[np.float64]:
-        """Logarithm of the last measurement's likelihood, array () or (B,), no unit."""
+        """Logarithm of the likelihood of the last measurement's components that were there, array () or (B,), no
+        unit; zero without any."""
+    @property
+    def mahalanobis(self) -> NDArray[np.float64]:
+        """Mahalanobis distance sqrt(y^T S^-1 y) of the last measurement, array () or (B,), in standard deviations;
+        zero where it was missing."""
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Whether a step could not be carried out for a state, since P was last assigned: bool array () or (B,), no
+        unit. The state was left as it was before that step."""
     @property
     def repairs(self) -> int:
         """How often a covariance had lost its positive definiteness and was repaired (a count, no unit)."""
@@ -700,15 +715,42 @@ class GaussianFilter:
     @property
     def batch(self) -> int | None:
         """Number B of independent filters, or None where arrays have no leading axis (a count, no unit)."""
+    @property
+    def residual_x(self) -> _Function | None:
+        """Difference `residual_x(a, b)` of states, arrays (..., n) of one shape -> (..., n), in the state's units;
+        None: a - b."""
+    @residual_x.setter
+    def residual_x(self, value: _Function | None, /) -> None: ...
+    @property
+    def residual_z(self) -> _Function | None:
+        """Difference `residual_z(a, b)` of measurements, arrays (..., m) of one shape -> (..., m), in the
+        measurement's units; None: a - b."""
+    @residual_z.setter
+    def residual_z(self, value: _Function | None, /) -> None: ...
+    @property
+    def state_add(self) -> _Function | None:
+        """Sum `state_add(x, dx)` of a state and a difference, arrays (n,) or (B, n) -> the same shape, in the
+        state's units; None: x + dx."""
+    @state_add.setter
+    def state_add(self, value: _Function | None, /) -> None: ...
 
 @final
 class KalmanFilter(GaussianFilter):
     """Linear Kalman filter x' = F x + w, z = H x + v with w ~ N(0, Q), v ~ N(0, R).
 
     `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a
-    leading axis (B, ...).
+    leading axis (B, ...). Of the functions `residual_z` and `state_add` are used, `residual_x` by the smoother.
     """
-    def __new__(cls, dim_x: int, dim_z: int, *, batch: int | None = None) -> KalmanFilter: ...
+    def __new__(
+        cls,
+        dim_x: int,
+        dim_z: int,
+        *,
+        batch: int | None = None,
+        residual_x: _Function | None = None,
+        residual_z: _Function | None = None,
+        state_add: _Function | None = None,
+    ) -> KalmanFilter: ...
     @property
     def F(self) -> NDArray[np.float64]:
         """Transition matrix, array (n, n) or (B, n, n), in the state's units; identity at first."""
@@ -722,11 +764,39 @@ class KalmanFilter(GaussianFilter):
     def predict(self, /, *, F: ArrayLike | None = None, Q: ArrayLike | None = None) -> None:
         """x <- F x, P <- F P F^T + Q. `F` (n, n) or (B, n, n) and `Q` replace the attributes for this step."""
     def update(self, /, z: ArrayLike | None, R: ArrayLike | None = None, H: ArrayLike | None = None) -> None:
-        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
-        one.
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are neither
+        NaN nor masked. None means that all are missing.
 
-        `R` and `H` replace the attributes for this step. NumericalError when the innovation covariance is not
-        positive definite.
+        `R` and `H` replace the attributes for this step. NumericalError when no state has a positive definite
+        innovation covariance. Exceptions of the functions leave x and P as they were.
+        """
+    def batch_filter(
+        self,
+        /,
+        zs: _Items,
+        Fs: _Items | None = None,
+        Qs: _Items | None = None,
+        Hs: _Items | None = None,
+        Rs: _Items | None = None,
+        *,
+        update_first: bool = False,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Filters the measurements `zs` of T times, each as `update` takes it, from the present state on.
+
+        Returns means (T, n), covariances (T, n, n) after the updates and those after the predictions, in the
+        state's units, with the batch's axis after T. `Fs`, `Qs`, `Hs`, `Rs`, sequences of T items, replace the
+        attributes where an item is not None. With `update_first` each time is updated, then predicted.
+        ValueError naming the sequence for a wrong number of items or shape.
+        """
+    def rts_smoother(
+        self, /, Xs: ArrayLike, Ps: ArrayLike, Fs: _Items | None = None, Qs: _Items | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units, with
+        the batch's axis after T (Rauch, Tung, Striebel 1965).
+
+        Returns smoothed means (T, n), covariances, gains and predicted covariances (T, n, n). Gain and
+        prediction k are of the step from time k to k + 1; `Fs` and `Qs`, sequences of T items as in
+        `batch_filter`, are of the step to their time. NaN where a state cannot be smoothed.
         """
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
@@ -737,9 +807,19 @@ class ExtendedKalmanFilter(GaussianFilter):
     `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a
     leading axis (B, ...). Functions are vectorised over leading axes: `fx` and `Hx` map (..., n) to (..., n)
     and (..., m); `FJacobian` and `HJacobian` map the means (n,) or (B, n) to (n, n) or (B, n, n) and (m, n)
-    or (B, m, n). Without a Jacobian central differences are taken.
+    or (B, m, n). Without a Jacobian central differences are taken. `residual_z` and `state_add` serve the
+    update, `residual_x` and `residual_z` the central differences, `residual_x` the smoother.
     """
-    def __new__(cls, dim_x: int, dim_z: int, *, batch: int | None = None) -> ExtendedKalmanFilter: ...
+    def __new__(
+        cls,
+        dim_x: int,
+        dim_z: int,
+        *,
+        batch: int | None = None,
+        residual_x: _Function | None = None,
+        residual_z: _Function | None = None,
+        state_add: _Function | None = None,
+    ) -> ExtendedKalmanFilter: ...
     def predict(self, /, fx: _Callback, FJacobian: _Callback | None = None) -> None:
         """x <- fx(x), P <- F P F^T + Q with F = `FJacobian(x)`, arrays (n,) and (n, n) or with a leading (B,
         ...), in the state's units.
@@ -749,11 +829,44 @@ class ExtendedKalmanFilter(GaussianFilter):
     def update(
         self, /, z: ArrayLike | None, HJacobian: _Callback | None, Hx: _Callback, R: ArrayLike | None = None
     ) -> None:
-        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
-        one.
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are neither
+        NaN nor masked. None means that all are missing.
 
         `HJacobian` None takes central differences of `Hx`. `R` replaces the attribute for this step.
         Exceptions of the functions leave x and P as they were.
+        """
+    def batch_filter(
+        self,
+        /,
+        zs: _Items,
+        fx: _Callback,
+        HJacobian: _Callback | None,
+        Hx: _Callback,
+        FJacobian: _Callback | None = None,
+        *,
+        Rs: _Items | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Filters the measurements `zs` of T times, each as `update` takes it, from the present state on; functions
+        as in `predict` and `update`.
+
+        Returns means (T, n) and covariances (T, n, n), in the state's units, with the batch's axis after T.
+        `Rs`, a sequence of T items, replaces R where an item is not None.
+        """
+    def rts_smoother(
+        self,
+        /,
+        Xs: ArrayLike,
+        Ps: ArrayLike,
+        fx: _Callback,
+        FJacobian: _Callback | None = None,
+        *,
+        Qs: _Items | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units, with
+        the batch's axis after T; functions as in `predict`.
+
+        Returns smoothed means (T, n), covariances and gains (T, n, n); gain k is from time k + 1 to k. `Qs`, a
+        sequence of T items, are of the step to their time. NaN where a state cannot be smoothed.
         """
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
@@ -963,6 +1076,9 @@ class UnscentedKalmanFilter(GaussianFilter):
     part of the sigma points, `fx(points, noise, dt)` with 4 n + 1 rows each. With `redraw=True` new points
     are drawn for the measurement; False measures the propagated ones, as filterpy 1 did, which leaves Q out
     of the innovation covariance.
+
+    For angles: differences `residual_x(a, b)`, `residual_z(a, b)`, weighted means `x_mean(points, weights)`,
+    `z_mean(points, weights)` and the sum `state_add(x, dx)`; see the attributes.
     """
     def __new__(
         cls,
@@ -973,6 +1089,11 @@ class UnscentedKalmanFilter(GaussianFilter):
         fx: _Callback,
         points: MerweScaledSigmaPoints,
         *,
+        x_mean: _Function | None = None,
+        z_mean: _Function | None = None,
+        residual_x: _Function | None = None,
+        residual_z: _Function | None = None,
+        state_add: _Function | None = None,
         batch: int | None = None,
         augmented: bool = False,
         redraw: bool = True,
@@ -999,21 +1120,51 @@ class UnscentedKalmanFilter(GaussianFilter):
     @property
     def redraw(self) -> bool:
         """Whether new points are drawn for the measurement (no unit)."""
+    @property
+    def x_mean(self) -> _Function | None:
+        """Weighted mean `x_mean(points, weights)` of states, arrays (2 n + 1, n) or (B, 2 n + 1, n) and (2 n + 1,) ->
+        (n,) or (B, n), in the state's units; weights sum to 1 and may be negative. None: the arithmetic mean."""
+    @x_mean.setter
+    def x_mean(self, value: _Function | None, /) -> None: ...
+    @property
+    def z_mean(self) -> _Function | None:
+        """As `x_mean`, of measurements: (..., 2 n + 1, m) -> (..., m), in the measurement's units."""
+    @z_mean.setter
+    def z_mean(self, value: _Function | None, /) -> None: ...
     def predict(self, /, dt: float | None = None, fx: _Callback | None = None, **fx_args: Any) -> None:
         """Propagates mean and covariance through `fx` by `dt` (default: that of the constructor, same unit);
         keywords are handed to `fx`.
 
-        Exceptions of `fx` leave x and P (n,), (n, n) as they were. NumericalError when P has no
-        positive-definite repair.
+        Exceptions of the functions leave x and P (n,), (n, n) as they were. NumericalError when every state
+        outgrows the range of numbers.
         """
     def update(
         self, /, z: ArrayLike | None, R: ArrayLike | None = None, hx: _Callback | None = None, **hx_args: Any
     ) -> None:
-        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
-        one.
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are neither
+        NaN nor masked. None means that all are missing.
 
-        `R` and `hx` replace the attributes for this step, keywords are handed to `hx`. Exceptions of `hx`
-        leave x and P as they were.
+        `R` and `hx` replace the attributes for this step, keywords are handed to `hx`. Exceptions of the
+        functions leave x and P as they were.
+        """
+    def batch_filter(
+        self, /, zs: _Items, Rs: _Items | None = None, dts: float | _Items | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Filters the measurements `zs` of T times, each as `update` takes it, from the present state on.
+
+        Returns means (T, n) and covariances (T, n, n), in the state's units, with the batch's axis after T.
+        `Rs`, a sequence of T items, replaces R where an item is not None; `dts`, a number or a sequence, is the
+        step to each time.
+        """
+    def rts_smoother(
+        self, /, Xs: ArrayLike, Ps: ArrayLike, Qs: _Items | None = None, dts: float | _Items | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units, with
+        the batch's axis after T (Sarkka 2008).
+
+        Returns smoothed means (T, n), covariances and gains (T, n, n); gain k is from time k + 1 to k. `Qs`, a
+        sequence of T items, and `dts`, a number or a sequence, are of the step to their time, as in
+        `batch_filter` (filterpy takes dts[k] for the step from k). NaN where a state cannot be smoothed.
         """
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
