@@ -14,8 +14,8 @@ use crate::error::Result;
 /// Callbacks receive states as rows, `(rows, n)`, and fill `(rows, n)` or `(rows, m)` values; Jacobian
 /// callbacks receive the `B` means and fill `(B, n, n)` or `(B, m, n)`. Errors of a callback are passed on
 /// and leave the filter unchanged; a state for which its results are not finite is marked in `failed`. The
-/// fields of [`GaussianState`] (`x`, `P`, `Q`, `R`, `y`, `S`, `K`, ...) are reached directly. Methods that end
-/// in `_on` take differences and sums of one's own.
+/// fields of [`GaussianState`] (`x`, `P`, `Q`, `R`, `y`, `S`, `K`, ...) are reached directly. Methods that
+/// end in `_on` take differences and sums of one's own.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ExtendedFilter {
@@ -80,8 +80,8 @@ impl ExtendedFilter {
         })
     }
 
-    /// Takes in the measurements `z` `(B, m)` through `hx` and its Jacobian: of each state the components that
-    /// are not NaN.
+    /// Takes in the measurements `z` `(B, m)` through `hx` and its Jacobian: of each state the components
+    /// that are not NaN.
     ///
     /// # Errors
     /// Those of the callbacks; [`Error::Argument`](crate::Error::Argument) as for `predict`;
@@ -130,7 +130,8 @@ impl ExtendedFilter {
         self.update_by_differences_on(&mut Vectors, z, hx)
     }
 
-    /// As [`update_by_differences`](Self::update_by_differences), with `residual_z` and `state_add` of `manifold`.
+    /// As [`update_by_differences`](Self::update_by_differences), with `residual_z` and `state_add` of
+    /// `manifold`.
     ///
     /// # Errors
     /// Those of `manifold` too.
@@ -148,13 +149,13 @@ impl ExtendedFilter {
         })
     }
 
-    /// Smooths a sequence of `T` filtered means `Xs` `(T, B, n)` and covariances `Ps` `(T, B, n, n)`. `fx` and
-    /// `jacobian` (`None`: central differences) get the number of the time to which they move the states; `Qs`
-    /// are those of the step to each time, the first unused; without them the filter's own.
+    /// Smooths a sequence of `T` filtered means `Xs` `(T, B, n)` and covariances `Ps` `(T, B, n, n)`. `fx`
+    /// and `jacobian` (`None`: central differences) get the number of the time to which they move the
+    /// states; `Qs` are those of the step to each time, the first unused; without them the filter's own.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) for wrong lengths and values; those of the callbacks and of
-    /// `manifold`, of which `residual_x` and `state_add` are used.
+    /// [`Error::Argument`](crate::Error::Argument) for wrong lengths and values; those of the callbacks
+    /// and of `manifold`, of which `residual_x` and `state_add` are used.
     pub fn rts_smoother<M: Manifold>(
         &self,
         manifold: &mut M,

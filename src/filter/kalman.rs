@@ -76,9 +76,9 @@ impl KalmanFilter {
         self.state.take_in(z, &measured, manifold, Failures::none(batch))
     }
 
-    /// Smooths a sequence of `T` filtered means `Xs` `(T, B, n)` and covariances `Ps` `(T, B, n, n)` (H. Rauch,
-    /// F. Tung, C. Striebel, "Maximum likelihood estimates of linear dynamic systems", 1965). `Fs` and `Qs`
-    /// are those of the step to each time, the first unused; without them the filter's own.
+    /// Smooths a sequence of `T` filtered means `Xs` `(T, B, n)` and covariances `Ps` `(T, B, n, n)` (H.
+    /// Rauch, F. Tung, C. Striebel, "Maximum likelihood estimates of linear dynamic systems", 1965). `Fs`
+    /// and `Qs` are those of the step to each time, the first unused; without them the filter's own.
     ///
     /// # Errors
     /// [`Error::Argument`](crate::Error::Argument) for wrong lengths and values; those of `manifold`, of

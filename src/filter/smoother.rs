@@ -29,11 +29,11 @@ pub(super) struct Transition {
     pub noise: Option<Vec<f64>>,
 }
 
-/// Smooths backwards. `step` gets the number of the next time, `Q` of the step to it, and the means and roots of
-/// one time.
+/// Smooths backwards. `step` gets the number of the next time, `Q` of the step to it, and the means and
+/// roots of one time.
 ///
-/// With `P' = F P F^T + Q` and the gain `C = P F^T P'^-1`: `x + C (x_s' - mean)` and `(L - C F L)(L - C F L)^T +
-/// C (Q + P_s') C^T`, which equals the usual `P + C (P_s' - P') C^T` and cannot become indefinite.
+/// With `P' = F P F^T + Q` and the gain `C = P F^T P'^-1`: `x + C (x_s' - mean)` and `(L - C F L)(L - C F
+/// L)^T + C (Q + P_s') C^T`, which equals the usual `P + C (P_s' - P') C^T` and cannot become indefinite.
 pub(super) fn smooth<M: Manifold>(
     state: &GaussianState,
     manifold: &mut M,

@@ -161,7 +161,8 @@ fn a_residual_across_the_cut_is_the_short_way() {
 
 #[test]
 fn the_smoother_equals_one_solution_of_all_equations() {
-    // A random walk measured directly: the smoothed mean minimises sum (x_t - x_{t-1})^2 / q + (z_t - x_t)^2 / r.
+    // A random walk measured directly: the smoothed mean minimises sum (x_t - x_{t-1})^2 / q + (z_t -
+    // x_t)^2 / r.
     let (q, r, p0, steps) = (0.5, 2.0, 4.0, 12);
     let rng = CounterRng::new(3);
     let z: Vec<f64> = (0..steps).map(|t| rng.normal(t)).collect();

@@ -89,8 +89,8 @@ impl ExtendedKalmanFilter {
         base.take(py, &core.state)
     }
 
-    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are neither
-    /// NaN nor masked. None means that all are missing.
+    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are
+    /// neither NaN nor masked. None means that all are missing.
     ///
     /// `HJacobian` None takes central differences of `Hx`. `R` replaces the attribute for this step.
     /// Exceptions of the functions leave x and P as they were.
@@ -126,8 +126,8 @@ impl ExtendedKalmanFilter {
         base.take(py, &core.state)
     }
 
-    /// Filters the measurements `zs` of T times, each as `update` takes it, from the present state on; functions
-    /// as in `predict` and `update`.
+    /// Filters the measurements `zs` of T times, each as `update` takes it, from the present state on;
+    /// functions as in `predict` and `update`.
     ///
     /// Returns means (T, n) and covariances (T, n, n), in the state's units, with the batch's axis after T.
     /// `Rs`, a sequence of T items, replaces R where an item is not None.
@@ -154,11 +154,11 @@ impl ExtendedKalmanFilter {
         Ok((x, P))
     }
 
-    /// Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units, with
-    /// the batch's axis after T; functions as in `predict`.
+    /// Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units,
+    /// with the batch's axis after T; functions as in `predict`.
     ///
-    /// Returns smoothed means (T, n), covariances and gains (T, n, n); gain k is from time k + 1 to k. `Qs`, a
-    /// sequence of T items, are of the step to their time. NaN where a state cannot be smoothed.
+    /// Returns smoothed means (T, n), covariances and gains (T, n, n); gain k is from time k + 1 to k.
+    /// `Qs`, a sequence of T items, are of the step to their time. NaN where a state cannot be smoothed.
     #[pyo3(signature = (Xs, Ps, fx, FJacobian=None, *, Qs=None))]
     fn rts_smoother<'py>(
         slf: &Bound<'py, Self>,

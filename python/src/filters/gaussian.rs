@@ -277,11 +277,11 @@ getters! {
     /// Logarithm of the likelihood of the last measurement's components that were there, array () or (B,), no
     /// unit; zero without any.
     log_likelihood(this, slf) -> Py<PyAny> = this.get(slf.py(), 7);
-    /// Mahalanobis distance sqrt(y^T S^-1 y) of the last measurement, array () or (B,), in standard deviations;
-    /// zero where it was missing.
+    /// Mahalanobis distance sqrt(y^T S^-1 y) of the last measurement, array () or (B,), in standard
+    /// deviations; zero where it was missing.
     mahalanobis(this, slf) -> Py<PyAny> = this.get(slf.py(), 8);
-    /// Whether a step could not be carried out for a state, since P was last assigned: bool array () or (B,), no
-    /// unit. The state was left as it was before that step.
+    /// Whether a step could not be carried out for a state, since P was last assigned: bool array () or
+    /// (B,), no unit. The state was left as it was before that step.
     failed(this, slf) -> Outcome<Bound<'py, PyAny>> = {
         let failed = this.variables().failed.clone();
         arrays::owned(slf.py(), &this.shape(7), failed)
@@ -319,8 +319,8 @@ impl GaussianFilter {
         self.set(3, self.covariance(3, value)?);
         Ok(())
     }
-    /// Difference `residual_x(a, b)` of states, arrays (..., n) of one shape -> (..., n), in the state's units;
-    /// None: a - b.
+    /// Difference `residual_x(a, b)` of states, arrays (..., n) of one shape -> (..., n), in the state's
+    /// units; None: a - b.
     #[getter]
     fn residual_x(&self, py: Python<'_>) -> Py<PyAny> {
         self.function(py, 0)

@@ -15,7 +15,8 @@ use std::sync::Mutex;
 /// Linear Kalman filter x' = F x + w, z = H x + v with w ~ N(0, Q), v ~ N(0, R).
 ///
 /// `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a
-/// leading axis (B, ...). Of the functions `residual_z` and `state_add` are used, `residual_x` by the smoother.
+/// leading axis (B, ...). Of the functions `residual_z` and `state_add` are used, `residual_x` by the
+/// smoother.
 #[pyclass(module = "jacoflow.filters", extends = GaussianFilter, frozen)]
 pub struct KalmanFilter {
     core: Mutex<Core>,
@@ -109,8 +110,8 @@ impl KalmanFilter {
         base.take(py, &core.state)
     }
 
-    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are neither
-    /// NaN nor masked. None means that all are missing.
+    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are
+    /// neither NaN nor masked. None means that all are missing.
     ///
     /// `R` and `H` replace the attributes for this step. NumericalError when no state has a positive definite
     /// innovation covariance. Exceptions of the functions leave x and P as they were.
@@ -138,8 +139,8 @@ impl KalmanFilter {
     /// Filters the measurements `zs` of T times, each as `update` takes it, from the present state on.
     ///
     /// Returns means (T, n), covariances (T, n, n) after the updates and those after the predictions, in the
-    /// state's units, with the batch's axis after T. `Fs`, `Qs`, `Hs`, `Rs`, sequences of T items, replace the
-    /// attributes where an item is not None. With `update_first` each time is updated, then predicted.
+    /// state's units, with the batch's axis after T. `Fs`, `Qs`, `Hs`, `Rs`, sequences of T items, replace
+    /// the attributes where an item is not None. With `update_first` each time is updated, then predicted.
     /// ValueError naming the sequence for a wrong number of items or shape.
     #[pyo3(signature = (zs, Fs=None, Qs=None, Hs=None, Rs=None, *, update_first=false))]
     fn batch_filter<'py>(
@@ -171,8 +172,8 @@ impl KalmanFilter {
         Ok((x, P, xp, Pp))
     }
 
-    /// Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units, with
-    /// the batch's axis after T (Rauch, Tung, Striebel 1965).
+    /// Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units,
+    /// with the batch's axis after T (Rauch, Tung, Striebel 1965).
     ///
     /// Returns smoothed means (T, n), covariances, gains and predicted covariances (T, n, n). Gain and
     /// prediction k are of the step from time k to k + 1; `Fs` and `Qs`, sequences of T items as in

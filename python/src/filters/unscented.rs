@@ -128,8 +128,9 @@ impl UnscentedKalmanFilter {
         write(&self.hx, value);
     }
 
-    /// Weighted mean `x_mean(points, weights)` of states, arrays (2 n + 1, n) or (B, 2 n + 1, n) and (2 n + 1,) ->
-    /// (n,) or (B, n), in the state's units; weights sum to 1 and may be negative. None: the arithmetic mean.
+    /// Weighted mean `x_mean(points, weights)` of states, arrays (2 n + 1, n) or (B, 2 n + 1, n) and (2 n
+    /// + 1,) -> (n,) or (B, n), in the state's units; weights sum to 1 and may be negative. None: the
+    /// arithmetic mean.
     #[getter]
     fn x_mean(slf: &Bound<'_, Self>) -> Py<PyAny> {
         slf.as_super().get().function(slf.py(), 3)
@@ -191,8 +192,8 @@ impl UnscentedKalmanFilter {
         base.take(py, &core.state)
     }
 
-    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are neither
-    /// NaN nor masked. None means that all are missing.
+    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are
+    /// neither NaN nor masked. None means that all are missing.
     ///
     /// `R` and `hx` replace the attributes for this step, keywords are handed to `hx`. Exceptions of the
     /// functions leave x and P as they were.
@@ -229,8 +230,8 @@ impl UnscentedKalmanFilter {
     /// Filters the measurements `zs` of T times, each as `update` takes it, from the present state on.
     ///
     /// Returns means (T, n) and covariances (T, n, n), in the state's units, with the batch's axis after T.
-    /// `Rs`, a sequence of T items, replaces R where an item is not None; `dts`, a number or a sequence, is the
-    /// step to each time.
+    /// `Rs`, a sequence of T items, replaces R where an item is not None; `dts`, a number or a sequence,
+    /// is the step to each time.
     #[pyo3(signature = (zs, Rs=None, dts=None))]
     fn batch_filter<'py>(
         slf: &Bound<'py, Self>,
@@ -250,12 +251,13 @@ impl UnscentedKalmanFilter {
         Ok((x, P))
     }
 
-    /// Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units, with
-    /// the batch's axis after T (Sarkka 2008).
+    /// Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units,
+    /// with the batch's axis after T (Sarkka 2008).
     ///
-    /// Returns smoothed means (T, n), covariances and gains (T, n, n); gain k is from time k + 1 to k. `Qs`, a
-    /// sequence of T items, and `dts`, a number or a sequence, are of the step to their time, as in
-    /// `batch_filter` (filterpy takes dts[k] for the step from k). NaN where a state cannot be smoothed.
+    /// Returns smoothed means (T, n), covariances and gains (T, n, n); gain k is from time k + 1 to k.
+    /// `Qs`, a sequence of T items, and `dts`, a number or a sequence, are of the step to their time, as
+    /// in `batch_filter` (filterpy takes dts[k] for the step from k). NaN where a state cannot be
+    /// smoothed.
     #[pyo3(signature = (Xs, Ps, Qs=None, dts=None))]
     fn rts_smoother<'py>(
         slf: &Bound<'py, Self>,

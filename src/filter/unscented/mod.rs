@@ -20,8 +20,9 @@ use crate::math::dense::{add_gram, forward, symmetrise};
 /// A callback receives sigma points as rows, `(B (2 n + 1), n)`: those of one state follow each other, the
 /// mean first, then `+`, then `-` in the order of the Cholesky factor's columns; it fills as many rows of `n`
 /// or `m` values. Errors of a callback are passed on and leave `x` and `P` as they were; a state for which
-/// its results are not finite is marked in `failed`. The fields of [`GaussianState`] (`x`, `P`, `Q`, `R`, `y`,
-/// `S`, `K`, ...) are reached directly. Methods that end in `_on` take differences, means and sums of one's own.
+/// its results are not finite is marked in `failed`. The fields of [`GaussianState`] (`x`, `P`, `Q`, `R`,
+/// `y`, `S`, `K`, ...) are reached directly. Methods that end in `_on` take differences, means and sums of
+/// one's own.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct UnscentedFilter {
@@ -41,7 +42,8 @@ impl UnscentedFilter {
     /// `batch` filters with `dim_x` state and `dim_z` measurement dimensions.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) when a dimension is zero or the constants do not fit `dim_x`.
+    /// [`Error::Argument`](crate::Error::Argument) when a dimension is zero or the constants do not fit
+    /// `dim_x`.
     pub fn new(batch: usize, dim_x: usize, dim_z: usize, points: SigmaPoints) -> Result<Self> {
         let state = GaussianState::new(batch, dim_x, dim_z)?;
         points.check(dim_x)?;
@@ -51,8 +53,9 @@ impl UnscentedFilter {
     /// Additive noise: the `2 n + 1` points go through `fx`, and `Q` is added to their covariance.
     ///
     /// # Errors
-    /// Those of `fx`; [`Error::Argument`](crate::Error::Argument) for arrays of wrong length or when no state has finite results;
-    /// [`Error::Numerical`](crate::Error::Numerical) when every state outgrows all numbers.
+    /// Those of `fx`; [`Error::Argument`](crate::Error::Argument) for arrays of wrong length or when no
+    /// state has finite results; [`Error::Numerical`](crate::Error::Numerical) when every state outgrows
+    /// all numbers.
     pub fn predict(&mut self, fx: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<()> {
         self.predict_on(&mut Vectors, fx)
     }
@@ -109,8 +112,9 @@ impl UnscentedFilter {
     /// Takes in the measurements `z` `(B, m)` through `hx`: of each state the components that are not NaN.
     ///
     /// # Errors
-    /// Those of `hx`; [`Error::Argument`](crate::Error::Argument) for arrays of wrong length or when no state has finite results;
-    /// [`Error::Numerical`](crate::Error::Numerical) when no state has a positive definite innovation covariance.
+    /// Those of `hx`; [`Error::Argument`](crate::Error::Argument) for arrays of wrong length or when no
+    /// state has finite results; [`Error::Numerical`](crate::Error::Numerical) when no state has a
+    /// positive definite innovation covariance.
     pub fn update(&mut self, z: &[f64], hx: impl FnMut(&[f64], &mut [f64]) -> Result<()>) -> Result<()> {
         self.update_on(&mut Vectors, z, hx)
     }

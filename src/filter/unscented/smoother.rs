@@ -9,12 +9,13 @@ use crate::filter::smoother::{Smoothed, Transition, smooth};
 use crate::math::dense::add_gram;
 
 impl UnscentedFilter {
-    /// Smooths a sequence of `T` filtered means `Xs` `(T, B, n)` and covariances `Ps` `(T, B, n, n)`. `fx` gets
-    /// the number of the time to which the points move; `Qs` are those of the step to each time, the first
-    /// unused; without them the filter's own.
+    /// Smooths a sequence of `T` filtered means `Xs` `(T, B, n)` and covariances `Ps` `(T, B, n, n)`. `fx`
+    /// gets the number of the time to which the points move; `Qs` are those of the step to each time, the
+    /// first unused; without them the filter's own.
     ///
     /// # Errors
-    /// [`Error::Argument`](crate::Error::Argument) for wrong lengths and values; those of `fx` and `manifold`.
+    /// [`Error::Argument`](crate::Error::Argument) for wrong lengths and values; those of `fx` and
+    /// `manifold`.
     pub fn rts_smoother<M: Manifold>(
         &self,
         manifold: &mut M,
