@@ -89,11 +89,11 @@ impl UnscentedKalmanFilter {
     ) -> Outcome<PyClassInitializer<Self>> {
         let (dim_x, dim_z, batch) = sizes(dim_x, dim_z, batch)?;
         let dt = step("dt", dt)?;
+        let mut core = Core::new(batch.unwrap_or(1), dim_x, dim_z, points.points)?;
         if points.n != dim_x {
             let expected = format!("sigma points of dim_x = {dim_x} dimensions");
             return Err(Error::argument("points", expected, format!("{} dimensions", points.n)).into());
         }
-        let mut core = Core::new(batch.unwrap_or(1), dim_x, dim_z, points.points)?;
         core.redraw = redraw;
         let base = GaussianFilter::new(py, &core.state, batch)?;
         for (index, function) in [residual_x, residual_z, state_add, x_mean, z_mean].into_iter().enumerate() {
