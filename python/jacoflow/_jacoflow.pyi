@@ -391,8 +391,10 @@ def estimate(
     A list or tuple of three frames (H, W) gives one FlowField (H, W), one of two frames as well
     (every method but "instantaneous"); a longer list gives a stack (T - 2, H, W), and so does an
     array (T, H, W) of any length. Frames are uint8, uint16, float32 or float64 in any grey scale: the
-    intensity gain does not change the flow. float64 is computed in float64, everything else in
-    float32. Inputs are never modified.
+    intensity gain does not change the flow. Other types are converted where that is exact: bool to
+    uint8, int8, int16 and float16 to float32, wider integers up to 2^53 to float64. Pixels that a
+    masked array hides are not used. float64 is computed in float64, everything else in float32.
+    Inputs are never modified.
 
     Parameters
     ----------

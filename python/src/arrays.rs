@@ -1,5 +1,6 @@
 //! numpy arrays in, core frames out, and back. Messages name the argument, what it was and what is accepted.
 
+use super::samples::{exact_samples, is_masked, refuse_path};
 use crate::errors::{Outcome, Raised};
 use jacoflow::buffer_pool;
 use jacoflow::error::Error;
@@ -11,17 +12,22 @@ use pyo3::prelude::*;
 use pyo3::types::{PyIterator, PyList};
 
 /// Sample types that frames may have, for messages.
-const ACCEPTED: &str = "an array of uint8, uint16, float32 or float64";
+const ACCEPTED: &str = "an array of bool, integers of 8 to 64 bits, float16, float32 or float64";
 
 /// `object` as a numpy array: itself, or what `numpy.asarray` makes of it. Misaligned memory and that of
 /// another byte order is copied.
 pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
-    let py = object.py();
-    if object.hasattr("mask")? && object.is_instance_of::<PyUntypedArray>() {
+    if is_masked(object)? {
         return Err(PyTypeError::new_err(format!(
             "{argument}: expected a plain array, got a masked one; pass its `data`, and the option mask=~frame.mask where there is one"
         )).into());
     }
+    native(object)
+}
+
+/// As [`as_array`], of masked arrays too, which stay masked.
+fn native<'py>(object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
+    let py = object.py();
     let array = if let Ok(array) = object.cast::<PyUntypedArray>() {
         array.clone()
     } else {
@@ -83,7 +89,18 @@ impl ColourRule {
 
 /// One frame `(H, W)`, or `(H, W, 3 or 4)` where colour is allowed.
 pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
-    let array = as_array(argument, object)?;
+    refuse_path(argument, object)?;
+    converted(argument, as_array(argument, object)?, colour)
+}
+
+/// As [`frame`], of masked arrays too: their masked pixels are NaN, which no estimate uses.
+pub fn frame_with_gaps(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
+    refuse_path(argument, object)?;
+    converted(argument, native(object)?, colour)
+}
+
+fn converted(argument: &str, array: Bound<'_, PyUntypedArray>, colour: ColourRule) -> Outcome<AnyFrame> {
+    let array = exact_samples(argument, array)?;
     let shape = array.shape().to_vec();
     match shape[..] {
         [height, width] => {
@@ -153,7 +170,8 @@ impl<'py> Frames<'py> {
             let list = PyList::new(object.py(), list)?;
             return Ok(Self { count: list.len(), object: list.into_any(), colour, is_array: false });
         }
-        let array = as_array("frames", object)?;
+        refuse_path("frames", object)?;
+        let array = native(object)?;
         let shape = array.shape().to_vec();
         let wanted = match colour {
             ColourRule::Refuse => "a list of frames (H, W) or a stack (T, H, W)",
@@ -178,7 +196,7 @@ impl<'py> Frames<'py> {
 
     /// Frame `index`.
     pub fn get(&self, index: usize) -> Outcome<AnyFrame> {
-        frame("frames", &self.object.get_item(index)?, self.colour)
+        frame_with_gaps("frames", &self.object.get_item(index)?, self.colour)
     }
 }
 

@@ -1,15 +1,16 @@
 //! Colour frames (H, W, 3) out of numpy arrays, and back.
 
 use super::{arrays::as_array, arrays::dtype_name, arrays::elements, arrays::owned, arrays::wrong_dtype};
+use super::samples::exact_samples;
 use crate::errors::{Outcome, Raised};
 use jacoflow::types::{AnyColourFrame, ColourFrame, Frame, Sample};
 use numpy::{Element, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// One frame `(H, W, 3)` of red, green and blue.
+/// One frame `(H, W, 3)` of red, green and blue, in a type that holds its samples exactly.
 pub fn colour_frame(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<AnyColourFrame> {
-    let array = as_array(argument, object)?;
+    let array = exact_samples(argument, as_array(argument, object)?)?;
     match array.shape() {
         &[height, width, 3] => {
             let size = (width, height);

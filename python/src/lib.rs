@@ -28,6 +28,7 @@ mod points;
 mod progress;
 #[cfg(feature = "reference")]
 mod reference_track;
+mod samples;
 mod scenes;
 mod segment;
 mod stereo;

@@ -1,6 +1,6 @@
 //! Graph segmentation for Python; what a user meets is `jacoflow.segment`.
 
-use super::arrays;
+use super::{arrays, samples::exact_samples};
 use crate::errors::Outcome;
 use crate::options::{self, Integer};
 use jacoflow::error::{Error, Result};
@@ -55,7 +55,7 @@ pub fn segment_felzenszwalb<'py>(
     let min_size = usize::try_from(min_size)
         .map_err(|_| Error::argument("min_size", "a number of pixels, at least 0", min_size))?;
     let options = SegmentOptions { scale, sigma, min_size };
-    let array = arrays::as_array("image", image)?;
+    let array = exact_samples("image", arrays::as_array("image", image)?)?;
     let shape = array.shape().to_vec();
     let (size, channels) = match shape[..] {
         [height, width] => ((width, height), 1),

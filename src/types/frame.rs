@@ -11,6 +11,9 @@ pub struct Frame<T> {
     data: Vec<T>,
 }
 
+/// Largest integer below which float64 holds every integer.
+pub const LARGEST_EXACT_INTEGER: u64 = 1 << 53;
+
 /// Which pixels may be used: `true` is used.
 pub type Mask = Frame<bool>;
 

@@ -48,7 +48,7 @@ impl FlowEstimator {
     /// A frame that raises an error (ValueError for another size, TypeError for another dtype) is not kept.
     fn push(&mut self, frame: &Bound<'_, PyAny>) -> Outcome<Option<FlowField>> {
         let py = frame.py();
-        let frame = arrays::frame("frame", frame, self.colour)?;
+        let frame = arrays::frame_with_gaps("frame", frame, self.colour)?;
         let field = py.detach(|| self.stream.push(frame)).map_err(|error| renamed(error, "frames", "frame"))?;
         Ok(field.map(FlowField::any))
     }
