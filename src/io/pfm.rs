@@ -1,6 +1,6 @@
 //! `.pfm`, the portable float map: one or three planes of float32, rows from the bottom up.
 
-use super::{decode::check_size, write::atomic_io};
+use super::{limits::check_size, write::atomic_io};
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};

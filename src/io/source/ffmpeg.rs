@@ -11,8 +11,9 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 pub(super) const KIND: Kind = Kind {
     name: "ffmpeg",
     accepts: |spec| Path::new(spec).is_file(),
-    open: |spec, policy| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, policy)?)),
-    open_colour: |spec, policy| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, policy)?)),
+    has_planes: false,
+    open: |spec, options| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, options.colour)?)),
+    open_colour: |spec, options| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, options.grey)?)),
 };
 
 /// "Every coded frame once": for `ffmpeg` 5.1 and later, and for earlier ones.

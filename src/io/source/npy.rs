@@ -3,7 +3,7 @@
 use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
 use crate::io::channels::{ChannelPolicy, Channels, Colour, ColourUse};
-use crate::io::decode::check_size;
+use crate::io::limits::check_size;
 use crate::io::npy::{Element, ElementType, NpyHeader};
 use crate::types::Sample;
 use std::collections::VecDeque;
@@ -14,8 +14,9 @@ use std::path::{Path, PathBuf};
 pub(super) const KIND: Kind = Kind {
     name: "npy",
     accepts: |spec| has_extension(spec, &["npy"]),
-    open: |spec, policy| Ok(Box::new(NpySource::open(spec, policy)?)),
-    open_colour: |spec, policy| Ok(Box::new(NpySource::open(spec, policy)?)),
+    has_planes: false,
+    open: |spec, options| Ok(Box::new(NpySource::open(spec, options.colour)?)),
+    open_colour: |spec, options| Ok(Box::new(NpySource::open(spec, options.grey)?)),
 };
 
 /// Bytes of frames held at once when the first axis varies fastest in the file.

@@ -1,6 +1,7 @@
 //! A part of a sequence.
 
 use super::{FrameSource, OpenOptions};
+use crate::io::planes::PixelSize;
 use crate::error::{Error, Result};
 
 /// The frames `start`, `start + step`, ... below `stop` of another source.
@@ -51,6 +52,12 @@ impl<F, S: FrameSource<F>> FrameSource<F> for Selected<S> {
     }
     fn frame_rate(&self) -> Option<f64> {
         self.inner.frame_rate().map(|rate| rate / self.step as f64)
+    }
+    fn time(&self) -> Option<f64> {
+        self.inner.time()
+    }
+    fn pixel_size(&self) -> Option<PixelSize> {
+        self.inner.pixel_size()
     }
     fn describe(&self) -> String {
         self.inner.describe()
