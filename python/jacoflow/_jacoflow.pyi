@@ -42,7 +42,8 @@ __all__ = [
     "luminance",
     "quantise",
     "smooth",
-    "FrameReader",
+    "_FrameSource",
+    "_kind_of",
     "_open_frames",
     "_read_pfm",
     "_read_flow",
@@ -1167,17 +1168,23 @@ class Sensor:
     def __getnewargs_ex__(self, /) -> tuple[tuple[()], dict[str, Any]]: ...
 
 @final
-class FrameReader:
-    """Reads frames (H, W), or (H, W, 3) with colour="rgb", one by one from the source of
-    `jacoflow.io.frames`; memory stays bounded. Samples keep the file's dtype and grey levels.
-    """
-    def __iter__(self, /) -> FrameReader: ...
+class _FrameSource:
+    """Frames (H, W), or (H, W, 3) with colour="rgb", one by one; what `jacoflow.io.FrameReader` wraps."""
+    def __iter__(self, /) -> _FrameSource: ...
     def __next__(self, /) -> NDArray[Any]: ...
     def __length_hint__(self, /) -> int: ...
     @property
     def frame_rate(self) -> float | None:
         """Frames per second, where the source says so, else None."""
-    def __reduce__(self, /) -> tuple[Any, ...]: ...
+    @property
+    def time(self) -> float | None:
+        """Time of the frame read last, s, where the source says so, else None."""
+    @property
+    def pixel_pitch(self) -> tuple[float, float] | None:
+        """Width and height of a pixel in `length_unit`, where the source says so, else None."""
+    @property
+    def length_unit(self) -> str | None:
+        """Unit of `pixel_pitch` as the source spells it, else None."""
 
 @final
 class _GradientTracker:
@@ -1345,19 +1352,31 @@ def _edge_pixels(
     view: ArrayLike, blur_sigma: float, threshold: float, threads: int | None
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
 def _estimate_row_offset(left: ArrayLike, right: ArrayLike, options: dict[str, Any]) -> tuple[float, bool]: ...
-def _open_frames(
+def _kind_of(
     spec: _Path,
-    colour: Literal["error", "luminance", "rgb"] | None,
-    grey: Literal["error", "repeat"] | None,
+    colour: str | None,
+    grey: str | None,
+    channel: int | None,
+    z: int | str | None,
     start: int,
     stop: int | None,
     step: int,
-) -> FrameReader: ...
+) -> str | None: ...
+def _open_frames(
+    spec: _Path,
+    colour: str | None,
+    grey: str | None,
+    channel: int | None,
+    z: int | str | None,
+    start: int,
+    stop: int | None,
+    step: int,
+) -> _FrameSource: ...
 def _read_disparity(path: _Path) -> NDArray[np.float32]: ...
 def _write_disparity(path: _Path, disparity: ArrayLike) -> int: ...
 def _read_flow(path: _Path, format: Literal["flo", "kitti"]) -> NDArray[np.float32]: ...
 def _read_image(
-    path: _Path, colour: Literal["error", "luminance", "rgb"] | None, grey: Literal["error", "repeat"] | None
+    path: _Path, colour: str | None, grey: str | None, channel: int | None, z: int | str | None
 ) -> NDArray[Any]: ...
 def _read_pfm(path: _Path) -> NDArray[np.float32]: ...
 def _write_flow(path: _Path, flow: ArrayLike, format: Literal["flo", "kitti"]) -> None: ...

@@ -59,7 +59,7 @@ mod _jacoflow {
             UnscentedKalmanFilter, resample, restore_extended, restore_kalman, restore_particle, restore_unscented,
         },
         flow_filter::{FlowFilter, restore_filter},
-        frames::{FrameReader, open_frames, read_one_image, write_frames},
+        frames::{PyFrameSource, open_frames, read_one_image, source_kind, write_frames},
         gauss_markov::PyGaussMarkovFilter,
         image::{luminance, quantise, smooth},
         io::{read_float_map, read_flow, write_float_map, write_flow},

@@ -93,13 +93,15 @@ impl EgomotionCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let plan = self.plan()?;
-        let opened = open_input(&self.input)?;
+        let mut opened = open_input(&self.input)?;
+        // Motion is estimated from flow in px.
+        opened.pixel_size = None;
         if let Some(pitch) = self.method.pixel_pitch.filter(|pitch| *pitch != (1.0, 1.0)) {
             let got = format!("{},{}", pitch.0, pitch.1);
             return Err(Error::argument("pixel_pitch", "none, as motion is estimated from flow in px", got));
         }
         let Prepared { plan: stream, is_double, .. } = prepare_with_covariance(
-            &opened,
+            &mut opened,
             &self.input,
             &self.method,
             &self.seen(),

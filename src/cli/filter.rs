@@ -58,8 +58,8 @@ impl FilterCommand {
         if let (Some(_), Some(name)) = (&self.resume, self.filter.given()) {
             return Err(Error::argument(name, "no such option with --resume, whose state has its own", "one"));
         }
-        let opened = open_input(&self.input)?;
-        let options = self.options(&opened)?;
+        let mut opened = open_input(&self.input)?;
+        let options = self.options(&mut opened)?;
         let steps = preprocess(&self.input, options.mask.as_ref())?;
         if let Some(path) = &self.save_state {
             check_target(path, self.output.force || self.resume.as_ref() == Some(path))?;
@@ -98,8 +98,13 @@ impl FilterCommand {
         }
     }
 
-    fn options(&self, opened: &Opened) -> Result<FlowFilterOptions> {
+    fn options(&self, opened: &mut Opened) -> Result<FlowFilterOptions> {
         let mut options = self.filter.options(opened.first.dtype)?;
+        if self.resume.is_some() {
+            // The saved state has its own.
+            opened.pixel_size = None;
+        }
+        options.pixel_pitch = opened.take_pixel_pitch(self.filter.pixel_pitch);
         options.sites = self.grid.sampling_grid()?;
         options.sites.shape(opened.first.size)?;
         options.mask = read_mask(self.grid.mask.as_deref(), opened.first.size)?;

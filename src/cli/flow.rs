@@ -55,7 +55,7 @@ pub struct Prepared {
 
 /// Builds the estimator that the arguments ask for.
 pub fn prepare(
-    opened: &Opened,
+    opened: &mut Opened,
     input: &InputArguments,
     method: &MethodArguments,
     grid: &GridArguments,
@@ -70,7 +70,7 @@ pub fn prepare(
         sites: places,
         mask: read_mask(grid.mask.as_deref(), opened.first.size)?,
         initial: method.initial.as_deref().map(read_initial).transpose()?,
-        pixel_pitch: method.pixel_pitch.unwrap_or((1.0, 1.0)),
+        pixel_pitch: opened.take_pixel_pitch(method.pixel_pitch),
         frame_period: opened.numbering.period(),
         covariance: !method.no_covariance && chosen.info().has_covariance,
         systematic: recursive.is_some(),
@@ -90,7 +90,7 @@ pub fn prepare(
 
 /// As [`prepare`], with the covariance that `purpose` needs.
 pub fn prepare_with_covariance(
-    opened: &Opened,
+    opened: &mut Opened,
     input: &InputArguments,
     method: &MethodArguments,
     grid: &GridArguments,
@@ -147,9 +147,9 @@ pub fn expect_output(plan: &OutputPlan, json: bool, has_other: bool) -> Result<(
 impl FlowCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
-        let opened = open_input(&self.input)?;
+        let mut opened = open_input(&self.input)?;
         let Prepared { plan: stream, is_double, description } =
-            prepare(&opened, &self.input, &self.method, &self.grid, &self.compute)?;
+            prepare(&mut opened, &self.input, &self.method, &self.grid, &self.compute)?;
         let estimator = stream.estimator();
         let fields = opened.frames.map(|frames| (frames + 1).saturating_sub(estimator.frames_needed()));
         let plan = plan_output(&self.output, &estimator.options().sites, self.messages.json, fields)?;

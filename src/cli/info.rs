@@ -1,10 +1,11 @@
 //! `jacoflow info`: what a recording or a result file holds.
 
-use super::arguments::MessageArguments;
+use super::arguments::{MessageArguments, PlaneArguments};
 use super::interrupt::Watch;
 use super::open::open_source;
 use super::progress::Bar;
 use super::report::{Report, print};
+use super::run::pixel_size;
 use crate::error::{Error, Result};
 use crate::io::npz::NpzReader;
 use crate::io::{FlowImage, FrameSource, OpenOptions, read_flo, read_kitti, read_npz, read_pfm};
@@ -30,6 +31,8 @@ pub struct InfoCommand {
     #[arg(required = true, value_name = "INPUT")]
     pub input: Vec<String>,
     #[command(flatten)]
+    pub planes: PlaneArguments,
+    #[command(flatten)]
     pub messages: MessageArguments,
 }
 
@@ -50,9 +53,11 @@ impl InfoCommand {
     }
 
     fn recording(&self, watch: &Watch) -> Result<Value> {
-        let options = OpenOptions { colour: crate::io::Colour::Luminance, ..OpenOptions::default() };
+        let planes = self.planes.selection();
+        let options = OpenOptions { colour: crate::io::Colour::Luminance, planes, ..OpenOptions::default() };
         let mut source = open_source(&self.input, &options)?;
         let (name, hint, rate) = (source.describe(), source.len_hint(), source.frame_rate());
+        let size = source.pixel_size();
         let first = source.next_frame()?;
         let first = first.ok_or_else(|| Error::argument("input", "at least one frame", format!("none in {name}")))?;
         let frames = match hint {
@@ -62,7 +67,8 @@ impl InfoCommand {
         let (width, height) = first.size();
         Ok(json!({
             "command": "info", "kind": "recording", "input": name, "frames": frames, "width": width, "height": height,
-            "dtype": first.dtype(), "fps": rate, "first_frame": statistics(samples(&first).into_iter()),
+            "dtype": first.dtype(), "fps": rate, "pixel_size": size.as_ref().map(pixel_size),
+            "first_frame": statistics(samples(&first).into_iter()),
         }))
     }
 }
@@ -208,6 +214,10 @@ fn in_words(summary: &Value) -> String {
             Value::String(value) => lines.push(format!("{:<14}{value}", name.replace('_', " "))),
             value => lines.push(format!("{:<14}{value}", name.replace('_', " "))),
         }
+    }
+    let pixel = &summary["pixel_size"];
+    if let Some(unit) = pixel["unit"].as_str() {
+        lines.push(format!("{:<14}{} x {} {unit}", "pixel size", pixel["width"], pixel["height"]));
     }
     if summary["first_frame"].is_object() {
         lines.push(format!("{:<14}{}", "first frame", statistics_line(&summary["first_frame"])));

@@ -54,13 +54,13 @@ impl MeasureCommand {
         let quantities: Vec<Quantity> =
             self.quantity.iter().map(|name| Quantity::parse(&name.replace('-', "_"))).collect::<Result<_>>()?;
         let target = table_target(self.output.as_deref(), self.force, self.messages.json)?;
-        let opened = open_input(&self.input)?;
+        let mut opened = open_input(&self.input)?;
         if let Some(quantity) = quantities.iter().find(|q| q.needs_fps() && opened.numbering.rate.is_none()) {
             let expected = format!("frames per second, for {}", quantity.name());
             return Err(Error::argument("fps", expected, "none, and the input does not say"));
         }
         let Prepared { plan, is_double, .. } = prepare_with_covariance(
-            &opened,
+            &mut opened,
             &self.input,
             &self.method,
             &self.grid,

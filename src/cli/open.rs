@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use crate::flow::InitialFlow;
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::io::{
-    ChannelPolicy, Colour, FilesSource, FrameFormat, FrameSource, OpenOptions, Selected, open, open_colour, read_flo,
-    read_image, read_kitti,
+    ChannelPolicy, Colour, FilesSource, FrameFormat, FrameSource, OpenOptions, PixelSize, Selected, open, open_colour,
+    read_flo, read_image, read_kitti,
 };
 use crate::parallel::Threads;
 use crate::pipeline::{FirstFrame, Numbering, peek};
@@ -25,8 +25,22 @@ pub struct Opened<F = AnyFrame> {
     pub frames: Option<usize>,
     /// Which frames of the input these are, and how fast.
     pub numbering: Numbering,
+    /// Whether the frame rate is what the file says.
+    pub has_own_rate: bool,
+    /// Size of a pixel as the file says, while no option replaces it.
+    pub pixel_size: Option<PixelSize>,
     /// What the input is, for messages and metadata.
     pub name: String,
+}
+
+impl<F> Opened<F> {
+    /// Width and height of a pixel: those `given`, else those of the file, else 1 px.
+    pub fn take_pixel_pitch(&mut self, given: Option<(f64, f64)>) -> (f64, f64) {
+        if given.is_some() {
+            self.pixel_size = None;
+        }
+        given.or(self.pixel_size.as_ref().map(|size| size.pitch)).unwrap_or((1.0, 1.0))
+    }
 }
 
 /// Opens the input and looks at its first frame.
@@ -47,10 +61,12 @@ pub fn open_colour_input(arguments: &InputArguments) -> Result<Opened<AnyColourF
 fn looked_at<F: FrameFormat>(source: Box<dyn FrameSource<F>>, arguments: &InputArguments) -> Result<Opened<F>> {
     let frames = source.len_hint();
     let name = source.describe();
-    let numbering = arguments.selection.numbering(arguments.fps, source.frame_rate());
+    let (rate, pixel_size) = (source.frame_rate(), source.pixel_size());
+    let numbering = arguments.selection.numbering(arguments.fps, rate);
+    let has_own_rate = arguments.fps.is_none() && rate.is_some();
     let (first, source) = peek(source)?;
     let first = first.ok_or_else(|| Error::argument("input", "at least one frame", format!("none in {name}")))?;
-    Ok(Opened { source, first, frames, numbering, name })
+    Ok(Opened { source, first, frames, numbering, has_own_rate, pixel_size, name })
 }
 
 /// One specification, or several image files in the order given.
@@ -70,7 +86,7 @@ fn open_files<P: ChannelPolicy>(
     if let Some(folder) = many.iter().find(|path| Path::new(path).is_dir()) {
         return Err(Error::argument("input", "image files only, when several inputs are given", folder));
     }
-    let files = FilesSource::new(many.iter().map(PathBuf::from).collect(), policy)?;
+    let files = FilesSource::new(many.iter().map(PathBuf::from).collect(), policy)?.with_planes(options.planes);
     Ok(Box::new(Selected::new(files, options)?))
 }
 

@@ -2,7 +2,6 @@
 
 import errno
 import pickle
-
 from pathlib import Path
 
 import numpy as np

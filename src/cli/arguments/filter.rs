@@ -55,7 +55,8 @@ pub struct FilterArguments {
     /// Leave the covariance out: faster, smaller files
     #[arg(long)]
     pub no_covariance: bool,
-    /// Physical size of a pixel; flow then comes in that unit per frame
+    /// Physical size of a pixel; flow then comes in that unit per frame [default: what a TIFF file of ImageJ or
+    /// OME says, else px]
     #[arg(long, value_name = "DX[,DY]", value_parser = parse_pair)]
     pub pixel_pitch: Option<(f64, f64)>,
 }
@@ -96,7 +97,6 @@ impl FilterArguments {
         points.kappa = self.kappa.unwrap_or(points.kappa);
         options.full_scale = self.full_scale.unwrap_or(if dtype == "uint16" { 65535.0 } else { 255.0 });
         options.covariance = !self.no_covariance;
-        options.pixel_pitch = self.pixel_pitch.unwrap_or((1.0, 1.0));
         Ok(options)
     }
 

@@ -104,9 +104,10 @@ impl<P: ChannelPolicy> Pages<P> {
         Ok(Some(frame))
     }
 
-    /// Time of the frame delivered last, s, where the file says so frame by frame.
+    /// Time of the frame delivered last, s: its own, else by the frame rate, where the file says either.
     pub(crate) fn time(&self) -> Option<f64> {
-        self.places.get(self.next.checked_sub(1)?)?.time
+        let last = self.next.checked_sub(1)?;
+        self.places.get(last)?.time.or_else(|| Some(last as f64 / self.frame_rate?))
     }
 
     /// Frames per second, where the file says so.
