@@ -13,7 +13,7 @@ _LUMA_FIRST = ("yuv", "gray")
 
 def depth(frame: Any) -> int:
     """Bits of a sample."""
-    return max(component.bits for component in frame.format.components)
+    return int(max(component.bits for component in frame.format.components))
 
 
 def upright(image: NDArray[Any], frame: Any) -> NDArray[Any]:

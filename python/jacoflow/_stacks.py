@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -26,13 +27,15 @@ class Stack:
     def __init__(self, request: Request, count: int, get: Callable[[int], Frame]) -> None:
         """`get(index)`: a frame (H, W), or (H, W, C) with C = 1, 3 or 4."""
         self._request, self._get = request, get
-        self._indices = iter(range(count)[request.start : request.stop : request.step])
+        self._indices = list(range(count)[request.start : request.stop : request.step])[::-1]
 
     def __length_hint__(self) -> int:
-        return self._indices.__length_hint__()
+        return len(self._indices)
 
     def __next__(self) -> Frame:
-        return _presented(self._get(next(self._indices)), self._request)
+        if not self._indices:
+            raise StopIteration
+        return _presented(self._get(self._indices.pop()), self._request)
 
 
 def _presented(frame: Frame, request: Request) -> Frame:
@@ -77,6 +80,15 @@ def _chosen(request: Request, shapes: Mapping[str, tuple[int, ...]]) -> str:
     raise FormatError(f"{request.source}: expected one array of frames, or its name as key=; the file holds {listed}")
 
 
+def _package(request: Request, name: str, what: str) -> Any:
+    """An optional package, or an error that says how to get it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        package = name.split(".")[0]
+        raise MissingDependencyError(f"{request.source}: reading {what} needs {package}: pip install {package}") from error
+
+
 def open_npz(request: Request) -> Stack:
     """The stack (T, H, W) in a .npz archive."""
     try:
@@ -97,7 +109,7 @@ def open_npz(request: Request) -> Stack:
 
 def open_hdf5(request: Request) -> Stack:
     """The data set (T, H, W) in an HDF5 file."""
-    file, sets = _hdf5_sets(request)
+    sets = _hdf5_sets(request)
     data = sets[_chosen(request, {name: each.shape for name, each in sets.items()})]
     return _stack(request, data.shape, data.__getitem__, lambda: np.asarray(data))
 
@@ -105,14 +117,15 @@ def open_hdf5(request: Request) -> Stack:
 def open_matlab(request: Request) -> Stack:
     """The array (H, W, T), rows x columns x time, in a MATLAB file; colour (H, W, 3, T)."""
     with open(request.source, "rb") as file:
-        # MATLAB 7.3 and later: HDF5 behind 512 bytes of its own.
-        is_hdf5 = b"MATLAB 7.3" in file.read(128) or file.seek(512) and file.read(4) == b"\x89HDF"
-    if is_hdf5:
-        file, sets = _hdf5_sets(request)
+        head = file.read(128)
+    # HDF5 behind a block of its own, whose text says so.
+    if b"MATLAB 7.3" in head:
+        sets = _hdf5_sets(request)
         # Axes are in the reverse order there.
         data = sets[_chosen(request, {name: each.shape for name, each in sets.items()})]
         shape = data.shape[::-1]
-        get, whole = (lambda k: np.asarray(data[k]).T), (lambda: np.asarray(data).T)
+        get: Callable[[int], Frame] = lambda k: np.asarray(data[k]).T
+        whole: Callable[[], Frame] = lambda: np.asarray(data).T
     else:
         array = _old_matlab(request)
         shape = array.shape
@@ -123,28 +136,20 @@ def open_matlab(request: Request) -> Stack:
 
 
 def _old_matlab(request: Request) -> Frame:
-    try:
-        import scipy.io
-    except ImportError as error:
-        raise MissingDependencyError(f"{request.source}: reading MATLAB files before 7.3 needs scipy: pip install scipy") from error
+    matlab = _package(request, "scipy.io", "MATLAB files before 7.3")
     kinds = {"double", "single", "logical", *(f"{sign}int{bits}" for sign in ("u", "") for bits in (8, 16, 32, 64))}
     try:
-        shapes = {name: shape for name, shape, kind in scipy.io.whosmat(request.source) if kind in kinds}
-        name = _chosen(request, shapes)
-        array: Frame = scipy.io.loadmat(request.source, variable_names=[name])[name]
-    except (ValueError, TypeError, NotImplementedError, scipy.io.matlab.MatReadError) as error:
-        if str(error).startswith("key:"):
-            raise
+        shapes = {name: shape for name, shape, kind in matlab.whosmat(request.source) if kind in kinds}
+    except (ValueError, TypeError, NotImplementedError, matlab.matlab.MatReadError) as error:
         raise FormatError(f"{request.source}: no MATLAB file that can be read ({error})") from error
+    name = _chosen(request, shapes)
+    array: Frame = matlab.loadmat(request.source, variable_names=[name])[name]
     return array
 
 
-def _hdf5_sets(request: Request) -> tuple[Any, dict[str, Any]]:
-    """The open file and its data sets of numbers by name."""
-    try:
-        import h5py
-    except ImportError as error:
-        raise MissingDependencyError(f"{request.source}: reading HDF5 (also MATLAB 7.3) needs h5py: pip install h5py") from error
+def _hdf5_sets(request: Request) -> dict[str, Any]:
+    """The data sets of numbers in a file by name; they keep it open."""
+    h5py = _package(request, "h5py", "HDF5 (also MATLAB 7.3)")
     try:
         file = h5py.File(request.source, "r")
     except FileNotFoundError:
@@ -158,21 +163,21 @@ def _hdf5_sets(request: Request) -> tuple[Any, dict[str, Any]]:
             sets[name] = item
 
     file.visititems(visit)
-    return file, sets
+    return sets
 
 
 def open_tifffile(request: Request) -> Stack | None:
     """A TIFF through tifffile, for kinds that the built-in reader does not know; None where tifffile is not
     installed. Its series must be along time, the channel and slice of the request aside."""
     try:
-        import tifffile
+        tifffile: Any = importlib.import_module("tifffile")
     except ImportError:
         return None
     file = tifffile.TiffFile(request.source)
     series = file.series[0]
     own = len(series.keyframe.shape)
     outer = list(zip(series.axes[:-own], series.shape[:-own], strict=True))
-    places = np.arange(len(series.pages)).reshape([length for _, length in outer])
+    places: NDArray[Any] = np.arange(len(series.pages)).reshape([length for _, length in outer])
     for axis, option, index in (("C", "channel", request.channel), ("Z", "z", request.z)):
         where = [k for k, (letter, _) in enumerate(outer) if letter == axis]
         if not where or index == "time":
@@ -182,8 +187,8 @@ def open_tifffile(request: Request) -> Stack | None:
             raise FormatError(f"{request.source}: holds {length} planes along {axis}; choose one with {option}=0 to {option}={length - 1}")
         if index is not None and int(index) >= length:
             raise ValueError(f"{option}: expected an index below {length}, got {index}")
-        places = places.take(int(index or 0), axis=where[0])
-        del outer[where[0]]
+        places = np.take(places, [int(index or 0)], axis=where[0])
+        outer[where[0]] = (axis, 1)
     if sum(length > 1 for _, length in outer) > 1:
         raise FormatError(f"{request.source}: holds planes along the axes {''.join(letter for letter, _ in outer)}; expected time alone")
     pages = places.ravel()

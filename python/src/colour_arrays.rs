@@ -1,7 +1,7 @@
 //! Colour frames (H, W, 3) out of numpy arrays, and back.
 
-use super::{arrays::as_array, arrays::dtype_name, arrays::elements, arrays::owned, arrays::wrong_dtype};
 use super::samples::exact_samples;
+use super::{arrays::as_array, arrays::dtype_name, arrays::elements, arrays::owned, arrays::wrong_dtype};
 use crate::errors::{Outcome, Raised};
 use jacoflow::types::{AnyColourFrame, ColourFrame, Frame, Sample};
 use numpy::{Element, PyUntypedArray, PyUntypedArrayMethods};

@@ -92,7 +92,13 @@ const MAX_DELAY: usize = 2;
 impl<T: SimdReal> Pipeline<T> {
     /// A pipeline around `stage`, without sinks.
     pub fn new(stage: Box<dyn Stage<T>>) -> Self {
-        Self { numbering: Numbering::default(), stage, sinks: Vec::new(), times: VecDeque::new(), summary: Summary::default() }
+        Self {
+            numbering: Numbering::default(),
+            stage,
+            sinks: Vec::new(),
+            times: VecDeque::new(),
+            summary: Summary::default(),
+        }
     }
 
     /// Which frames of the input come.

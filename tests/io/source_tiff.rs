@@ -104,7 +104,9 @@ fn other_files_have_no_channels() {
 #[test]
 fn files_that_only_others_read_say_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, advice) in [("a.npz", "key="), ("a.MAT", "scipy"), ("a.raw", "numpy.fromfile"), ("a.cine", "16-bit TIFF")] {
+    for (name, advice) in
+        [("a.npz", "key="), ("a.MAT", "scipy"), ("a.raw", "numpy.fromfile"), ("a.cine", "16-bit TIFF")]
+    {
         let path = folder.path().join(name);
         std::fs::write(&path, "x").unwrap();
         let error = open(&path.to_string_lossy(), &OpenOptions::default()).err().unwrap();

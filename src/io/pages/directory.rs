@@ -98,8 +98,7 @@ pub(super) fn description(decoder: &mut FileDecoder) -> String {
     }
     let mut bytes = Vec::new();
     let mut block = [0; 4096];
-    while let Ok(Some(read)) =
-        decoder.image_ifd().find_tag_bytes(Tag::ImageDescription, &mut block, bytes.len() as u64)
+    while let Ok(Some(read)) = decoder.image_ifd().find_tag_bytes(Tag::ImageDescription, &mut block, bytes.len() as u64)
     {
         bytes.extend_from_slice(&block[..read.min(block.len())]);
         if read < block.len() {

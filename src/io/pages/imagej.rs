@@ -24,8 +24,7 @@ pub(super) fn parse(description: &str, resolution: Option<(f64, f64)>) -> Option
     recording.frame_rate = interval.map(|interval| 1.0 / interval).or(number("fps")).filter(|rate| rate.is_finite());
     let unit = values.get("unit").map_or("", |unit| unit.trim());
     let same_unit = values.get("yunit").is_none_or(|y| y.trim() == unit);
-    recording.pixel_size =
-        resolution.filter(|_| same_unit).and_then(|(x, y)| PixelSize::new((1.0 / x, 1.0 / y), unit));
+    recording.pixel_size = resolution.filter(|_| same_unit).and_then(|(x, y)| PixelSize::new((1.0 / x, 1.0 / y), unit));
     Some(recording)
 }
 

@@ -124,8 +124,10 @@ impl Recording {
                 (0..times).map(|time| self.place(channel, z, time)).collect()
             }
         };
-        let chosen: Vec<_> =
-            places.iter().filter_map(|&place| self.planes[place].page.map(|page| (page, self.planes[place].time))).collect();
+        let chosen: Vec<_> = places
+            .iter()
+            .filter_map(|&place| self.planes[place].page.map(|page| (page, self.planes[place].time)))
+            .collect();
         if chosen.is_empty() {
             return Err(Error::format(path, "its OME-XML says that the chosen planes are in other files"));
         }

@@ -74,7 +74,9 @@ impl Place<'_> {
         let planes = if layout.planes > 1 { count } else { 1 };
         if let (Some(palette), 1) = (palette, planes) {
             return match result {
-                DecodingResult::U8(indices) if bits < 8 => self.coloured(&self.unpacked(&indices, bits), palette, policy),
+                DecodingResult::U8(indices) if bits < 8 => {
+                    self.coloured(&self.unpacked(&indices, bits), palette, policy)
+                }
                 DecodingResult::U8(indices) => self.coloured(&indices, palette, policy),
                 DecodingResult::U16(indices) => self.coloured(&indices, palette, policy),
                 _ => Err(Error::format(path, "a palette whose indices are no unsigned integers")),

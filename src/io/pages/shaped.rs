@@ -36,7 +36,8 @@ pub(super) fn parse(
         return Ok(None);
     }
     let named = entries.get("axes").and_then(Value::as_str).filter(|axes| axes.chars().count() == shape.len());
-    let letters: Vec<char> = named.map_or_else(|| vec!['?'; outer.len()], |axes| axes.chars().take(outer.len()).collect());
+    let letters: Vec<char> =
+        named.map_or_else(|| vec!['?'; outer.len()], |axes| axes.chars().take(outer.len()).collect());
     let long: Vec<(char, usize)> = letters.into_iter().zip(outer.iter().copied()).filter(|(_, n)| *n > 1).collect();
     let mut sizes = Sizes { channels: 1, slices: 1, times: 1 };
     let mut order = Vec::new();

@@ -43,11 +43,8 @@ pub(super) fn restated(
     memory: u64,
 ) -> Result<Decoder<Cursor<Vec<u8>>>> {
     let is_tiled = !numbers(decoder, Tag::TileOffsets).is_empty();
-    let (places, lengths) = if is_tiled {
-        (Tag::TileOffsets, Tag::TileByteCounts)
-    } else {
-        (Tag::StripOffsets, Tag::StripByteCounts)
-    };
+    let (places, lengths) =
+        if is_tiled { (Tag::TileOffsets, Tag::TileByteCounts) } else { (Tag::StripOffsets, Tag::StripByteCounts) };
     let compression = number(decoder, Tag::Compression).unwrap_or(UNCOMPRESSED);
     let chunks = numbers(decoder, places).into_iter().zip(numbers(decoder, lengths));
     let mut file = Restated::new(decoder.byte_order());

@@ -1,8 +1,8 @@
 //! A part of a sequence.
 
 use super::{FrameSource, OpenOptions};
-use crate::io::planes::PixelSize;
 use crate::error::{Error, Result};
+use crate::io::planes::PixelSize;
 
 /// The frames `start`, `start + step`, ... below `stop` of another source.
 #[derive(Debug)]
