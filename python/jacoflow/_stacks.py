@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import weakref
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -174,7 +175,17 @@ def open_tifffile(request: Request) -> Stack | None:
     except ImportError:
         return None
     file = tifffile.TiffFile(request.source)
-    series = file.series[0]
+    try:
+        stack = Stack(request, *_series_frames(request, file.series[0]))
+    except BaseException:
+        file.close()
+        raise
+    weakref.finalize(stack, file.close)
+    return stack
+
+
+def _series_frames(request: Request, series: Any) -> tuple[int, Callable[[int], Frame]]:
+    """Number of frames of a series of tifffile, of the channel and slice of the request, and the frames."""
     own = len(series.keyframe.shape)
     outer = list(zip(series.axes[:-own], series.shape[:-own], strict=True))
     places: NDArray[Any] = np.arange(len(series.pages)).reshape([length for _, length in outer])
@@ -198,4 +209,4 @@ def open_tifffile(request: Request) -> Stack | None:
         image: Frame = series.pages[int(pages[k])].asarray()
         return np.moveaxis(image, 0, -1) if is_planar else image
 
-    return Stack(request, len(pages), get)
+    return len(pages), get

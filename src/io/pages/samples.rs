@@ -94,9 +94,7 @@ impl Place<'_> {
             DecodingResult::F64(samples) => self.frame(count, planes, samples, policy),
             DecodingResult::I8(samples) => self.frame(count, planes, converted::<_, f32>(samples), policy),
             DecodingResult::I16(samples) => self.frame(count, planes, converted::<_, f32>(samples), policy),
-            DecodingResult::F16(samples) => {
-                self.frame(count, planes, samples.into_iter().map(|value| value.to_f32()).collect(), policy)
-            }
+            DecodingResult::F16(samples) => self.frame(count, planes, converted::<_, f32>(samples), policy),
             DecodingResult::I32(samples) => self.frame(count, planes, converted::<_, f64>(samples), policy),
             DecodingResult::U32(samples) => self.frame(count, planes, converted::<_, f64>(samples), policy),
             DecodingResult::I64(samples) => {

@@ -137,13 +137,14 @@ impl Restated {
         entries.sort_by_key(|(tag, _)| tag.to_u16());
         let mut fields = Vec::new();
         for (tag, values) in &entries {
-            let field = match values[..] {
-                [one] => one,
-                _ => {
-                    let place = self.bytes.len() as u32;
-                    values.iter().for_each(|&value| self.long(value));
-                    place
+            let field = if let [one] = values[..] {
+                one
+            } else {
+                let place = self.bytes.len() as u32;
+                for &value in values {
+                    self.long(value);
                 }
+                place
             };
             fields.push((tag.to_u16(), values.len() as u32, field));
         }

@@ -91,16 +91,9 @@ fn resolved(text: &str) -> String {
             };
             Some((c?, after))
         });
-        match reference {
-            Some((c, after)) => {
-                out.push(c);
-                rest = after;
-            }
-            None => {
-                out.push('&');
-                rest = after;
-            }
-        }
+        let (c, after) = reference.unwrap_or(('&', after));
+        out.push(c);
+        rest = after;
     }
     out + rest
 }
