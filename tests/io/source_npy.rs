@@ -107,8 +107,27 @@ fn lies_about_the_size_are_found_before_anything_is_allocated() {
         let error = NpySource::open(&path, Colour::Luminance).unwrap_err();
         assert!(matches!(error, Error::Format { .. }), "{shape:?}: {error}");
     }
-    let path = save(folder.path(), &NpyHeader::new(ElementType::I64, &[1, 3, 4]), &[0i64; 12]);
-    assert!(NpySource::open(&path, Colour::Error).unwrap_err().to_string().contains("astype"));
+    let path = save(folder.path(), &NpyHeader::new(ElementType::Text(1), &[1, 3, 4]), &[65_u32; 12]);
+    assert!(NpySource::open(&path, Colour::Error).unwrap_err().to_string().contains("got text"));
+}
+
+#[test]
+fn other_numbers_become_the_type_that_holds_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = |path: PathBuf| NpySource::open(&path, Colour::Error).unwrap().next_frame();
+    let path = save(folder.path(), &NpyHeader::new(ElementType::I16, &[1, 1, 2]), &[-3_i16, 4]);
+    assert_eq!(first(path).unwrap(), Some(AnyFrame::F32(Frame::new(2, 1, vec![-3.0, 4.0]).unwrap())));
+    let path = save(folder.path(), &NpyHeader::new(ElementType::Bool, &[1, 2]), &[1_u8, 0]);
+    assert_eq!(first(path).unwrap(), Some(AnyFrame::U8(Frame::new(2, 1, vec![1, 0]).unwrap())));
+    let path = save(folder.path(), &NpyHeader::new(ElementType::U32, &[1, 2]), &[u32::MAX, 0]);
+    assert_eq!(first(path).unwrap(), Some(AnyFrame::F64(Frame::new(2, 1, vec![f64::from(u32::MAX), 0.0]).unwrap())));
+    // 1 and -2 as float16.
+    let path = save(folder.path(), &NpyHeader::new(ElementType::F16, &[1, 2]), &[0x3c00_u16, 0xc000]);
+    assert_eq!(first(path).unwrap(), Some(AnyFrame::F32(Frame::new(2, 1, vec![1.0, -2.0]).unwrap())));
+    let path = save(folder.path(), &NpyHeader::new(ElementType::I64, &[1, 2]), &[1_i64 << 53, 7]);
+    assert!(first(path).is_ok());
+    let path = save(folder.path(), &NpyHeader::new(ElementType::I64, &[1, 2]), &[(1_i64 << 53) + 1, 7]);
+    assert!(first(path).unwrap_err().to_string().contains("beyond 2^53"));
 }
 
 proptest! {

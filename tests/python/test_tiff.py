@@ -178,7 +178,7 @@ def test_sample_types(dtype, core, order, tmp_path):
 
 def test_samples_that_no_frame_holds_are_refused(tmp_path):
     tifffile.imwrite(tmp_path / "s.tif", np.array([[2**53 + 1, 0], [0, 0]], np.uint64), photometric="minisblack")
-    with pytest.raises(jacoflow.FormatError, match=r"s\.tif: samples of uint64 beyond 2\^53"):
+    with pytest.raises(jacoflow.FormatError, match=r"s\.tif: samples of 64 bits beyond 2\^53"):
         io.read_image(tmp_path / "s.tif")
 
 

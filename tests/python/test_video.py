@@ -139,7 +139,7 @@ def test_deep_video_keeps_its_depth(pix_fmt, shift, tmp_path):
         images = list(video.frames(path, grey=grey))
         assert all(image.dtype == np.uint16 for image in images)
         # Levels between those of 8 bit.
-        assert (np.array(images) % 257 != 0).all()
+        assert (np.array(images) % 257 != 0).any()
         if pix_fmt.startswith("gray"):
             assert np.abs(np.array(images, int) - np.array(coded, int)).max() <= 16
     assert next(video.frames(path, grey=None)).dtype == np.uint16

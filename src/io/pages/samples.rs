@@ -4,8 +4,9 @@ use super::directory::{FileDecoder, number, numbers, tiff_error, unsupported};
 use super::stored::{LZMA, PALETTE, ZSTANDARD, restated};
 use crate::error::{Error, Result};
 use crate::io::channels::{ChannelPolicy, Channels};
+use crate::io::exact::{exact_doubles, widened};
 use crate::io::limits::check_size;
-use crate::types::{LARGEST_EXACT_INTEGER, Sample};
+use crate::types::Sample;
 use std::io::{Read, Seek};
 use std::path::Path;
 use tiff::ColorType;
@@ -92,19 +93,13 @@ impl Place<'_> {
             DecodingResult::U16(samples) => self.frame(count, planes, samples, policy),
             DecodingResult::F32(samples) => self.frame(count, planes, samples, policy),
             DecodingResult::F64(samples) => self.frame(count, planes, samples, policy),
-            DecodingResult::I8(samples) => self.frame(count, planes, converted::<_, f32>(samples), policy),
-            DecodingResult::I16(samples) => self.frame(count, planes, converted::<_, f32>(samples), policy),
-            DecodingResult::F16(samples) => self.frame(count, planes, converted::<_, f32>(samples), policy),
-            DecodingResult::I32(samples) => self.frame(count, planes, converted::<_, f64>(samples), policy),
-            DecodingResult::U32(samples) => self.frame(count, planes, converted::<_, f64>(samples), policy),
-            DecodingResult::I64(samples) => {
-                let samples = self.exact(&samples, "int64", |v| (v.unsigned_abs(), v as f64))?;
-                self.frame(count, planes, samples, policy)
-            }
-            DecodingResult::U64(samples) => {
-                let samples = self.exact(&samples, "uint64", |v| (v, v as f64))?;
-                self.frame(count, planes, samples, policy)
-            }
+            DecodingResult::I8(samples) => self.frame(count, planes, widened::<_, f32>(samples), policy),
+            DecodingResult::I16(samples) => self.frame(count, planes, widened::<_, f32>(samples), policy),
+            DecodingResult::F16(samples) => self.frame(count, planes, widened::<_, f32>(samples), policy),
+            DecodingResult::I32(samples) => self.frame(count, planes, widened::<_, f64>(samples), policy),
+            DecodingResult::U32(samples) => self.frame(count, planes, widened::<_, f64>(samples), policy),
+            DecodingResult::I64(samples) => self.frame(count, planes, exact_doubles(path, &samples)?, policy),
+            DecodingResult::U64(samples) => self.frame(count, planes, exact_doubles(path, &samples)?, policy),
         }
     }
 
@@ -159,18 +154,6 @@ impl Place<'_> {
         }
         self.frame(channels, 1, levels, policy)
     }
-
-    fn exact<I: Copy>(&self, samples: &[I], kind: &str, of: impl Fn(I) -> (u64, f64)) -> Result<Vec<f64>> {
-        let values = samples.iter().map(|&sample| of(sample));
-        let exact: Option<Vec<f64>> =
-            values.map(|(size, value)| (size <= LARGEST_EXACT_INTEGER).then_some(value)).collect();
-        let message = format!("samples of {kind} beyond 2^53, which float64 does not hold exactly");
-        exact.ok_or_else(|| Error::format(self.path, message))
-    }
-}
-
-fn converted<I: Into<S>, S>(samples: Vec<I>) -> Vec<S> {
-    samples.into_iter().map(Into::into).collect()
 }
 
 fn has_alpha<R: Read + Seek>(decoder: &mut Decoder<R>) -> bool {

@@ -3,6 +3,7 @@
 use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
 use crate::io::channels::{ChannelPolicy, Channels, Colour, ColourUse};
+use crate::io::exact::{exact_doubles, widened};
 use crate::io::limits::check_size;
 use crate::io::npy::{Element, ElementType, NpyHeader};
 use crate::types::Sample;
@@ -23,7 +24,8 @@ pub(super) const KIND: Kind = Kind {
 const BATCH_BYTES: usize = 64 << 20;
 
 /// A numpy stack `(T, H, W)`, one frame `(H, W)` or colour `(T, H, W, C)` with C = 1, 3 or 4; uint8, uint16,
-/// float32 or float64, either byte order. Where colour frames are read `(H, W, 3)` and `(H, W, 4)` are one
+/// float32 or float64, or a type that one of these holds exactly (bool as uint8, int8, int16 and float16 as
+/// float32, wider integers as float64), either byte order. Where colour frames are read `(H, W, 3)` and `(H, W, 4)` are one
 /// colour frame.
 ///
 /// In C order each frame is read when it is needed. In Fortran order the samples of one frame are spread
@@ -55,12 +57,8 @@ impl<P: ChannelPolicy> NpySource<P> {
         let available = file.metadata().map_err(|e| Error::io(path, e))?.len();
         let mut file = BufReader::with_capacity(1 << 18, file);
         let (header, data_start) = NpyHeader::read(&mut file).map_err(|e| file_error(path, e))?;
-        if !matches!(header.element, ElementType::U8 | ElementType::U16 | ElementType::F32 | ElementType::F64) {
-            let message = format!(
-                "element type '{}' is not one of uint8, uint16, float32, float64 (convert with .astype)",
-                header.element.descriptor()
-            );
-            return Err(Error::format(path, message));
+        if matches!(header.element, ElementType::Text(_)) {
+            return Err(Error::format(path, "expected an array of numbers, got text"));
         }
         let (frames, height, width, channels) = match header.shape[..] {
             [h, w] => (1, h, w, 1),
@@ -87,18 +85,29 @@ impl<P: ChannelPolicy> NpySource<P> {
         Ok(Self { path, policy, file, header, data_start, frames, width, height, channels, next: 0, gathered })
     }
 
-    fn frame_of<T: Element + Sample>(&self, bytes: &[u8]) -> Result<P::Frame> {
+    fn frame_of<S: Sample>(&self, samples: Vec<S>) -> Result<P::Frame> {
         let (path, width, height, count) = (self.path.as_path(), self.width, self.height, self.channels);
-        let samples = T::decode(bytes, self.header.big_endian);
         self.policy.frame(Channels { path, width, height, count, samples })
     }
 
     fn any_frame(&self, bytes: &[u8]) -> Result<P::Frame> {
+        fn decoded<T: Element + Into<S>, S>(bytes: &[u8], big_endian: bool) -> Vec<S> {
+            widened(T::decode(bytes, big_endian))
+        }
+        let order = self.header.big_endian;
         match self.header.element {
-            ElementType::U8 => self.frame_of::<u8>(bytes),
-            ElementType::U16 => self.frame_of::<u16>(bytes),
-            ElementType::F32 => self.frame_of::<f32>(bytes),
-            _ => self.frame_of::<f64>(bytes),
+            ElementType::Bool | ElementType::U8 => self.frame_of(u8::decode(bytes, order)),
+            ElementType::U16 => self.frame_of(u16::decode(bytes, order)),
+            ElementType::F32 => self.frame_of(f32::decode(bytes, order)),
+            ElementType::F64 => self.frame_of(f64::decode(bytes, order)),
+            ElementType::I8 => self.frame_of::<f32>(decoded::<i8, _>(bytes, order)),
+            ElementType::I16 => self.frame_of::<f32>(decoded::<i16, _>(bytes, order)),
+            ElementType::F16 => self.frame_of::<f32>(decoded::<half::f16, _>(bytes, order)),
+            ElementType::I32 => self.frame_of::<f64>(decoded::<i32, _>(bytes, order)),
+            ElementType::U32 => self.frame_of::<f64>(decoded::<u32, _>(bytes, order)),
+            ElementType::I64 => self.frame_of(exact_doubles(&self.path, &i64::decode(bytes, order))?),
+            ElementType::U64 => self.frame_of(exact_doubles(&self.path, &u64::decode(bytes, order))?),
+            ElementType::Text(_) => Err(Error::format(&self.path, "expected an array of numbers, got text")),
         }
     }
 
