@@ -71,8 +71,8 @@ class FrameReader:
 
     @property
     def time(self) -> float | None:
-        """Time of the frame read last, s: its own time stamp (video, OME-XML) or by the frame rate; None
-        where the source says neither, and before the first frame."""
+        """Time in s of the last of the frames read: its own time stamp (video, OME-XML) or by the frame rate;
+        None where the source says neither, and before the first frame."""
         return self._source.time
 
     @property

@@ -1,4 +1,4 @@
-"""What `jacoflow.io.frames` is asked for."""
+"""The arguments of `jacoflow.io.frames` as one value."""
 
 from __future__ import annotations
 

@@ -17,7 +17,8 @@ pub(crate) const EXTENSIONS: &[&str] = &["png", "tif", "tiff", "bmp", "pgm", "pn
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is damaged, of an unknown format or
-/// too large, has several pages, or `policy` refuses it; [`Error::Missing`] for a kind of TIFF that is not read.
+/// too large, has several pages, or `policy` refuses it; [`Error::Missing`] for a kind of TIFF that is not
+/// read.
 pub fn read_image<P: ChannelPolicy>(path: impl AsRef<Path>, policy: P) -> Result<P::Frame> {
     read_plane(path, policy, PlaneSelection::default())
 }

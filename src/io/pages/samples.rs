@@ -1,4 +1,4 @@
-//! The samples of a page as a frame: sample types that frames do not have, packed bits, palettes, separate planes.
+//! The samples of a page as a frame: types that frames do not have, packed bits, palettes, separate planes.
 
 use super::directory::{FileDecoder, number, numbers, tiff_error, unsupported};
 use super::stored::{LZMA, PALETTE, ZSTANDARD, restated};

@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use serde_json::Value;
 use std::path::Path;
 
-/// What the description says; `None` when it is no such shape or not that of `pages` pages of `width` x `height`
-/// px.
+/// What the description says; `None` when it is no such shape, or not that of `pages` pages of `width` x
+/// `height` px.
 ///
 /// # Errors
 /// [`Error::Format`] when the planes lie along several axes that are not named, or along one that is neither

@@ -25,8 +25,8 @@ const BATCH_BYTES: usize = 64 << 20;
 
 /// A numpy stack `(T, H, W)`, one frame `(H, W)` or colour `(T, H, W, C)` with C = 1, 3 or 4; uint8, uint16,
 /// float32 or float64, or a type that one of these holds exactly (bool as uint8, int8, int16 and float16 as
-/// float32, wider integers as float64), either byte order. Where colour frames are read `(H, W, 3)` and `(H, W, 4)` are one
-/// colour frame.
+/// float32, wider integers as float64), either byte order. Where colour frames are read `(H, W, 3)` and
+/// `(H, W, 4)` are one colour frame.
 ///
 /// In C order each frame is read when it is needed. In Fortran order the samples of one frame are spread
 /// over the whole file, so each pass over the file gathers as many frames as fit 64 MiB (at least one).
