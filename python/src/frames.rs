@@ -181,7 +181,6 @@ fn plane_selection(channel: Option<i64>, z: Option<&Bound<'_, PyAny>>) -> Outcom
 }
 
 /// The options of `jacoflow.io.frames`, checked.
-#[expect(clippy::too_many_arguments, reason = "the options of jacoflow.io.frames")]
 fn request(
     colour: Option<&str>,
     grey: Option<&str>,
