@@ -55,8 +55,8 @@ pub struct FilterArguments {
     /// Leave the covariance out: faster, smaller files
     #[arg(long)]
     pub no_covariance: bool,
-    /// Physical size of a pixel; flow then comes in that unit per frame [default: what a TIFF file of ImageJ or
-    /// OME says, else px]
+    /// Physical size of a pixel; flow then comes in that unit per frame [default: what a TIFF file of ImageJ
+    /// or OME says, else px]
     #[arg(long, value_name = "DX[,DY]", value_parser = parse_pair)]
     pub pixel_pitch: Option<(f64, f64)>,
 }

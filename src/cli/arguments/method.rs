@@ -72,8 +72,8 @@ pub struct MethodArguments {
     /// Standard deviation of the pixel noise, grey levels [default: from the frames]
     #[arg(long, value_name = "LEVELS", value_parser = parse_not_negative)]
     pub noise: Option<f64>,
-    /// Physical size of a pixel; flow then comes in that unit per frame [default: what a TIFF file of ImageJ or
-    /// OME says, else px]
+    /// Physical size of a pixel; flow then comes in that unit per frame [default: what a TIFF file of ImageJ
+    /// or OME says, else px]
     #[arg(long, value_name = "DX[,DY]", value_parser = parse_pair)]
     pub pixel_pitch: Option<(f64, f64)>,
 }

@@ -4,7 +4,7 @@ use super::recording::{Axis, Recording, Sizes};
 use crate::io::planes::PixelSize;
 use std::collections::HashMap;
 
-/// What the description says; `None` when it is not ImageJ's. `resolution`: pixels per unit along x and y.
+/// What the description says; `None` when it is not ImageJ's. `resolution`: pixels per unit, x and y.
 ///
 /// A stack that is no hyperstack has one axis, which ImageJ calls slices whatever it is: it is taken for time.
 pub(super) fn parse(description: &str, resolution: Option<(f64, f64)>) -> Option<Recording> {

@@ -19,8 +19,8 @@ const ALPHA: [u64; 2] = [1, 2];
 /// The frame in the current page, whose data begin `shift` bytes behind where its directory says.
 ///
 /// # Errors
-/// [`Error::Format`] for a damaged page, samples that no frame type holds exactly, or a policy that refuses it;
-/// [`Error::Missing`] for a kind that is not read.
+/// [`Error::Format`] for a damaged page, samples that no frame type holds exactly, or a policy that refuses
+/// it; [`Error::Missing`] for a kind that is not read.
 pub(super) fn read<P: ChannelPolicy>(
     decoder: &mut FileDecoder,
     path: &Path,
