@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 /// What the description says; `None` when it is not ImageJ's. `resolution`: pixels per unit, x and y.
 ///
-/// A stack that is no hyperstack has one axis, which ImageJ calls slices whatever it is: it is taken for time.
+/// A stack that is no hyperstack has one axis, which ImageJ always calls slices: it is taken for time.
 pub(super) fn parse(description: &str, resolution: Option<(f64, f64)>) -> Option<Recording> {
     if !description.starts_with("ImageJ=") {
         return None;

@@ -89,7 +89,8 @@ impl Uniform {
 }
 
 /// One frame a file, in the order given, by the policies [`Colour`] and [`Grey`](crate::io::Grey). A TIFF
-/// file of several pages is an [`Error::Format`], unless a channel and slice are selected of which it has one.
+/// file of several pages is an [`Error::Format`], unless a channel and slice are selected of which it has
+/// one.
 #[derive(Debug)]
 pub struct FilesSource<P = Colour> {
     paths: Vec<PathBuf>,
