@@ -62,13 +62,19 @@ impl InfoCommand {
         let (width, height) = first.size();
         Ok(json!({
             "command": "info", "kind": "recording", "input": name, "frames": frames, "width": width, "height": height,
-            "dtype": first.dtype(), "fps": rate, "first_frame": statistics(samples(&first).into_iter()),
+            "dtype": first.dtype(), "fps": rate, "first_frame": frame_statistics(&first),
         }))
     }
 }
 
-fn samples(frame: &AnyFrame) -> Vec<f64> {
-    frame.to_real::<f64>().into_data()
+/// Statistics of the samples, which are not copied: they may be as many as memory holds.
+fn frame_statistics(frame: &AnyFrame) -> Value {
+    match frame {
+        AnyFrame::U8(frame) => statistics(frame.data().iter().map(|&sample| f64::from(sample))),
+        AnyFrame::U16(frame) => statistics(frame.data().iter().map(|&sample| f64::from(sample))),
+        AnyFrame::F32(frame) => statistics(frame.data().iter().map(|&sample| f64::from(sample))),
+        AnyFrame::F64(frame) => statistics(frame.data().iter().copied()),
+    }
 }
 
 fn count(source: &mut dyn FrameSource, bar: &Bar<'_>) -> Result<usize> {
@@ -105,7 +111,7 @@ fn result_info(path: &Path) -> Option<Result<Value>> {
         "flo" => Some(read_flo(path).map(|flow| flow_image_info(path, "flo", &flow))),
         "pfm" => Some(read_pfm(path).map(|map| {
             let names: &[&str] = if map.planes.len() == 1 { &["value"] } else { &["u", "v", "third"] };
-            let planes = names.iter().zip(&map.planes).map(|(name, plane)| (*name, wide(plane)));
+            let planes = names.iter().zip(&map.planes).map(|(name, plane)| (*name, &plane[..]));
             planes_info(path, "pfm", (map.width, map.height), planes)
         })),
         "npz" => Some(npz_info(path)),
@@ -122,23 +128,19 @@ fn is_kitti(path: &Path) -> bool {
     info.color_type == png::ColorType::Rgb && info.bit_depth == png::BitDepth::Sixteen
 }
 
-fn wide(plane: &[f32]) -> Vec<f64> {
-    plane.iter().map(|value| f64::from(*value)).collect()
-}
-
 fn flow_image_info(path: &Path, format: &str, flow: &FlowImage) -> Value {
-    let planes = [("u", wide(flow.u())), ("v", wide(flow.v()))];
+    let planes = [("u", flow.u()), ("v", flow.v())];
     planes_info(path, format, (flow.width(), flow.height()), planes.into_iter())
 }
 
-fn planes_info<'a>(
+fn planes_info<'a, T: Copy + Into<f64> + 'a>(
     path: &Path,
     format: &str,
     (width, height): (usize, usize),
-    planes: impl Iterator<Item = (&'a str, Vec<f64>)>,
+    planes: impl Iterator<Item = (&'a str, &'a [T])>,
 ) -> Value {
     let planes: Map<String, Value> =
-        planes.map(|(name, values)| (name.to_string(), statistics(values.into_iter()))).collect();
+        planes.map(|(name, values)| (name.to_string(), statistics(values.iter().map(|&value| value.into())))).collect();
     let share = planes.get("u").or(planes.get("value")).map(|plane| plane["known_share"].clone());
     json!({
         "command": "info", "kind": "result", "input": path, "format": format, "width": width, "height": height,
@@ -165,7 +167,7 @@ fn npz_info(path: &Path) -> Result<Value> {
     }
     let stored = read_npz::<f64>(path)?;
     let field = &stored.field;
-    let planes = field.layout.parameters.iter().map(|name| (name.as_str(), field.plane(name).unwrap_or(&[]).to_vec()));
+    let planes = field.layout.parameters.iter().map(|name| (name.as_str(), field.plane(name).unwrap_or(&[])));
     let mut info = planes_info(path, "npz", (field.width, field.height), planes);
     let valid = field.status.iter().filter(|status| status.is_valid()).count();
     info["valid_share"] = json!(valid as f64 / field.len().max(1) as f64);

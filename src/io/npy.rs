@@ -97,6 +97,11 @@ impl NpyHeader {
         Self { element, big_endian: false, fortran_order: false, shape: shape.to_vec() }
     }
 
+    /// The shape as Python writes it: `(2, 48, 64)`.
+    pub fn shown(&self) -> String {
+        crate::error::shape_text(&self.shape)
+    }
+
     /// Number of elements; `None` when it does not fit a machine word.
     pub fn count(&self) -> Option<usize> {
         self.shape.iter().try_fold(1usize, |n, &axis| n.checked_mul(axis))
@@ -238,6 +243,10 @@ pub fn write_values<T: Element>(values: &[T], out: &mut impl Write) -> io::Resul
 
 /// Values stored with the first axis fastest, put in C order.
 pub(crate) fn from_fortran_order<T: Copy>(values: &[T], shape: &[usize]) -> Vec<T> {
+    // Without values, the other axes may be of any length, and strides beyond a machine word.
+    if values.is_empty() {
+        return Vec::new();
+    }
     let mut strides = Vec::with_capacity(shape.len());
     let mut stride = 1;
     for &axis in shape {

@@ -64,6 +64,12 @@ pub fn read_pfm(path: impl AsRef<Path>) -> Result<FloatMap> {
     let (width, height) = (side()?, side()?);
     check_size(path, width, height)?;
     let scale: f64 = word(&mut file, path)?.parse().map_err(|_| bad("its scale is no number"))?;
+    // Its sign is the byte order, which 0 and NaN do not say.
+    if scale == 0.0 || !scale.is_finite() {
+        return Err(bad(&format!(
+            "its scale is {scale}; expected a number below 0 (little-endian) or above (big-endian)"
+        )));
+    }
     let (needed, mut bytes) = (4 * channels * width * height, Vec::new());
     file.take(needed as u64).read_to_end(&mut bytes).map_err(|e| Error::io(path, e))?;
     if bytes.len() < needed {

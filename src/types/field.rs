@@ -1,7 +1,7 @@
 //! The result of an estimator: planes of motion parameters, their covariance and their status.
 
 use super::{AffineFlow, MOTION_NAMES, SamplingGrid, Status};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_memory};
 use crate::math::Real;
 
 /// What a field holds at each site and where the sites are.
@@ -114,6 +114,9 @@ impl<T: Real> FlowField<T> {
     fn of(layout: FieldLayout, covariance: bool, value: T) -> Result<Self> {
         let (width, height) = layout.sites.shape(layout.frame_size)?;
         let (n, p) = (width * height, layout.parameters.len());
+        // The covariance is the largest part of all that an estimator holds.
+        let values = if covariance { p * (p + 1) / 2 } else { p };
+        check_memory("frames", n.checked_mul(values * size_of::<T>()))?;
         Ok(Self {
             width,
             height,

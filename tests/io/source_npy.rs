@@ -100,12 +100,23 @@ fn grey_stacks_are_refused_where_colour_is_needed_or_repeated() {
 #[test]
 fn lies_about_the_size_are_found_before_anything_is_allocated() {
     let folder = tempfile::tempdir().unwrap();
-    for shape in
-        [vec![1 << 40, 3, 4], vec![3, 30_000, 30_000], vec![usize::MAX, 8, 8], vec![2, 3, 5], vec![7], vec![1, 1, 1, 2]]
-    {
-        let path = save(folder.path(), &NpyHeader::new(ElementType::F32, &shape), &[0f32; 24]);
-        let error = NpySource::open(&path, Colour::Luminance).unwrap_err();
-        assert!(matches!(error, Error::Format { .. }), "{shape:?}: {error}");
+    for shape in [
+        vec![1 << 40, 3, 4],
+        vec![3, 30_000, 30_000],
+        vec![usize::MAX, 8, 8],
+        vec![2, 3, 5],
+        vec![7],
+        vec![1, 1, 1, 2],
+        vec![usize::MAX - 99, 1, 1],
+    ] {
+        for fortran_order in [false, true] {
+            for element in [ElementType::U8, ElementType::F32] {
+                let header = NpyHeader { fortran_order, ..NpyHeader::new(element, &shape) };
+                let path = save(folder.path(), &header, &[0u8; 24]);
+                let error = NpySource::open(&path, Colour::Luminance).unwrap_err();
+                assert!(matches!(error, Error::Format { .. }), "{shape:?}: {error}");
+            }
+        }
     }
     let path = save(folder.path(), &NpyHeader::new(ElementType::I64, &[1, 3, 4]), &[0i64; 12]);
     assert!(NpySource::open(&path, Colour::Error).unwrap_err().to_string().contains("astype"));
@@ -125,4 +136,21 @@ proptest! {
         let is_format_error = matches!(NpySource::open(&path, Colour::Error), Err(Error::Format { .. }));
         prop_assert!(is_format_error);
     }
+}
+
+/// A frame takes no more memory than its samples, and a pass over the file no more than its own frames.
+#[test]
+fn a_million_frames_of_one_pixel_come_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let count = 1_000_000;
+    let values: Vec<u16> = (0..count).map(|t| (t % 65_521) as u16).collect();
+    let header = NpyHeader { fortran_order: true, ..NpyHeader::new(ElementType::U16, &[count, 1, 1]) };
+    let path = save(folder.path(), &header, &values);
+    let mut source = NpySource::open(&path, Colour::Error).unwrap();
+    for &value in &values[..1000] {
+        assert_eq!(source.next_frame().unwrap().unwrap(), AnyFrame::U16(Frame::filled(1, 1, value)));
+    }
+    assert_eq!(source.skip(count - 1001).unwrap(), count - 1001);
+    assert_eq!(source.next_frame().unwrap().unwrap(), AnyFrame::U16(Frame::filled(1, 1, values[count - 1])));
+    assert!(source.next_frame().unwrap().is_none());
 }

@@ -6,9 +6,8 @@ use crate::io::channels::{ChannelPolicy, Channels, Colour, ColourUse};
 use crate::io::decode::check_size;
 use crate::io::npy::{Element, ElementType, NpyHeader};
 use crate::types::Sample;
-use std::collections::VecDeque;
 use std::fs::File;
-use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
+use std::io::{BufReader, ErrorKind, Read, Seek};
 use std::path::{Path, PathBuf};
 
 pub(super) const KIND: Kind = Kind {
@@ -39,7 +38,10 @@ pub struct NpySource<P: ChannelPolicy = Colour> {
     height: usize,
     channels: usize,
     next: usize,
-    gathered: VecDeque<P::Frame>,
+    /// Bytes of frames in C order from frame `gathered_from` on, when the first axis varies fastest in the
+    /// file.
+    gathered: Vec<u8>,
+    gathered_from: usize,
 }
 
 impl<P: ChannelPolicy> NpySource<P> {
@@ -68,22 +70,35 @@ impl<P: ChannelPolicy> NpySource<P> {
             [t, h, w, c @ (1 | 3 | 4)] => (t, h, w, c),
             _ => {
                 let message = format!(
-                    "expected a stack (T, H, W), a frame (H, W) or colour (T, H, W, 3), got shape {:?}",
-                    header.shape
+                    "expected a stack (T, H, W), a frame (H, W) or colour (T, H, W, 3), got shape {}",
+                    header.shown()
                 );
                 return Err(Error::format(path, message));
             }
         };
         check_size(path, width, height)?;
         policy.check_layout(path, channels)?;
-        let needed = header.byte_count().map(|n| n as u64 + data_start as u64);
+        let needed = header.byte_count().and_then(|n| (n as u64).checked_add(data_start as u64));
         if needed.is_none_or(|n| n > available) {
-            let message = format!("cut off: shape {:?} needs more than the {available} bytes there are", header.shape);
+            let message = format!("cut off: shape {} needs more than the {available} bytes there are", header.shown());
             return Err(Error::format(path, message));
         }
         let (path, data_start) = (path.to_path_buf(), data_start as u64);
-        let gathered = VecDeque::new();
-        Ok(Self { path, policy, file, header, data_start, frames, width, height, channels, next: 0, gathered })
+        let (next, gathered, gathered_from) = (0, Vec::new(), 0);
+        Ok(Self {
+            path,
+            policy,
+            file,
+            header,
+            data_start,
+            frames,
+            width,
+            height,
+            channels,
+            next,
+            gathered,
+            gathered_from,
+        })
     }
 
     fn frame_of<T: Element + Sample>(&self, bytes: &[u8]) -> Result<P::Frame> {
@@ -106,40 +121,52 @@ impl<P: ChannelPolicy> NpySource<P> {
     }
 
     fn read_frame(&mut self) -> Result<P::Frame> {
-        let length = self.frame_bytes();
-        let at = self.data_start + self.next as u64 * length as u64;
-        let mut bytes = vec![0; length];
-        // Relative, so that frames in a row keep what is already buffered.
-        let read = self.file.stream_position().and_then(|now| {
-            self.file.seek_relative(at as i64 - now as i64)?;
-            self.file.read_exact(&mut bytes)
-        });
-        read.map_err(|e| file_error(&self.path, e))?;
+        let mut bytes = vec![0; self.frame_bytes()];
+        self.read_at(self.next * bytes.len(), &mut bytes)?;
         self.any_frame(&bytes)
+    }
+
+    /// Frame `next` of a file whose first axis varies fastest.
+    fn gathered_frame(&mut self) -> Result<P::Frame> {
+        let length = self.frame_bytes();
+        let held = self.gathered_from..self.gathered_from + self.gathered.len() / length;
+        if !held.contains(&self.next) {
+            self.gather()?;
+        }
+        let start = (self.next - self.gathered_from) * length;
+        self.any_frame(&self.gathered[start..start + length])
     }
 
     /// One pass over a file whose first axis varies fastest: frames `next..next + batch`.
     fn gather(&mut self) -> Result<()> {
-        let (size, stack) = (self.header.element.size(), self.frames);
-        let batch = (BATCH_BYTES / self.frame_bytes().max(1)).clamp(1, stack - self.next);
-        let mut frames = vec![vec![0; self.frame_bytes()]; batch];
-        let mut line = vec![0; stack * size];
-        self.file.seek(SeekFrom::Start(self.data_start)).map_err(|e| Error::io(&self.path, e))?;
+        let (size, stack, length) = (self.header.element.size(), self.frames, self.frame_bytes());
+        let batch = (BATCH_BYTES / length).clamp(1, stack - self.next);
+        let mut line = vec![0; batch * size];
+        self.gathered.clear();
+        self.gathered.resize(batch * length, 0);
+        self.gathered_from = self.next;
         // Rows vary fastest, then columns, then channels.
         let (rows, columns) = (self.height, self.width);
         for at in 0..rows * columns * self.channels {
             let (y, x, channel) = (at % rows, at / rows % columns, at / (rows * columns));
-            self.file.read_exact(&mut line).map_err(|e| file_error(&self.path, e))?;
+            self.read_at((at * stack + self.next) * size, &mut line)?;
             let to = ((y * columns + x) * self.channels + channel) * size;
-            for (frame, sample) in frames.iter_mut().zip(line[self.next * size..].chunks_exact(size)) {
+            for (frame, sample) in self.gathered.chunks_exact_mut(length).zip(line.chunks_exact(size)) {
                 frame[to..to + size].copy_from_slice(sample);
             }
         }
-        for bytes in frames {
-            let frame = self.any_frame(&bytes)?;
-            self.gathered.push_back(frame);
-        }
         Ok(())
+    }
+
+    /// Fills `bytes` from byte `at` of the data on.
+    fn read_at(&mut self, at: usize, bytes: &mut [u8]) -> Result<()> {
+        let at = self.data_start + at as u64;
+        // Relative, so that what is already buffered is kept.
+        let read = self.file.stream_position().and_then(|now| {
+            self.file.seek_relative(at as i64 - now as i64)?;
+            self.file.read_exact(bytes)
+        });
+        read.map_err(|e| file_error(&self.path, e))
     }
 }
 
@@ -157,21 +184,13 @@ impl<P: ChannelPolicy> FrameSource<P::Frame> for NpySource<P> {
         if self.next >= self.frames {
             return Ok(None);
         }
-        let frame = if self.header.fortran_order {
-            if self.gathered.is_empty() {
-                self.gather()?;
-            }
-            self.gathered.pop_front()
-        } else {
-            Some(self.read_frame()?)
-        };
+        let frame = if self.header.fortran_order { self.gathered_frame()? } else { self.read_frame()? };
         self.next += 1;
-        Ok(frame)
+        Ok(Some(frame))
     }
     fn skip(&mut self, count: usize) -> Result<usize> {
         let passed = count.min(self.frames - self.next);
         self.next += passed;
-        self.gathered.drain(..passed.min(self.gathered.len()));
         Ok(passed)
     }
     fn len_hint(&self) -> Option<usize> {
