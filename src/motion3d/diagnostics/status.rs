@@ -7,14 +7,16 @@ use crate::motion3d::kernels::{Bilinear, Weighted, best_rotation, depths, equati
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::result::{Alternative, Status};
+use crate::motion3d::model::rows::Matrix5;
 use crate::motion3d::model::whitening::Whitening;
-use crate::motion3d::solver::covariance::{PLAUSIBLE, determined, direction_deviation};
+use crate::motion3d::solver::covariance::{PLAUSIBLE, determined, direction_block, direction_deviation};
 use crate::motion3d::solver::depth_smoother;
 use crate::motion3d::solver::likelihood::{DISTINCT, SAME};
 use crate::motion3d::solver::refine::{MANY, StoppingCriteria, descend};
 use crate::motion3d::solver::starts::{SEARCHED, at_most, evaluate};
 use crate::scattered::{SiteSmoother, Smoother};
-use nalgebra::{Matrix2x3, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, SMatrix, Vector3};
+use std::f64::consts::PI;
 
 /// Below so many points several motions may explain them exactly.
 const FEW: usize = 12;
@@ -66,11 +68,8 @@ pub(crate) fn judge(
         Status::IllConditioned
     } else if twin.is_some() || !competing.is_empty() {
         Status::Ambiguous
-    } else if !solution.described
-        || deviation.is_nan()
-        || deviation > WIDE
-        || far(inliers, &motions, deviation, rng.stream(1))
-    {
+    } else if let Some(reach) = beyond_theory(inliers, solution, &motions, deviation, turned.is_some(), rng.stream(1)) {
+        solution.covariance = solution.covariance.map(|covariance| reaching(&covariance, reach));
         Status::IllConditioned
     } else if turned.is_some() || solution.undecided.is_some() {
         Status::Ambiguous
@@ -79,6 +78,44 @@ pub(crate) fn judge(
     } else {
         Status::Ok
     };
+}
+
+/// Root of the mean squared angle, rad, between a direction and any others of the sphere, `sqrt((pi^2 - 4) /
+/// 2)`.
+const ANY_DIRECTION: f64 = 1.712_9;
+
+/// How far, rad, directions lie that explain the flow as well, where the covariance of the estimate does not
+/// say it; `deviation`: the standard deviation by it, degrees; `turned`: the opposite direction is one of
+/// them.
+fn beyond_theory(
+    inliers: &Observations,
+    solution: &Solution,
+    motions: &[Motion],
+    deviation: f64,
+    turned: bool,
+    rng: CounterRng,
+) -> Option<f64> {
+    let farthest = far(inliers, motions, if deviation.is_finite() { deviation } else { 0.0 }, rng);
+    let holds = solution.described && deviation <= WIDE;
+    let reach = match farthest {
+        None if holds => return None,
+        _ if turned => PI,
+        // The confidence interval has no end.
+        farthest if solution.described => farthest.unwrap_or(0.0),
+        farthest => farthest.unwrap_or(0.0).max(ANY_DIRECTION),
+    };
+    Some(reach)
+}
+
+/// A covariance of (psi, w) whose directions reach so far, rad, with the rotations that suit them.
+fn reaching(covariance: &Matrix5, reach: f64) -> Matrix5 {
+    let direction = direction_block(covariance);
+    let Some(inverse) = direction.try_inverse() else { return *covariance };
+    let suited = covariance.fixed_view::<3, 2>(2, 0) * inverse;
+    let mut along = SMatrix::<f64, 5, 2>::zeros();
+    along.fixed_view_mut::<2, 2>(0, 0).copy_from(&Matrix2::identity());
+    along.fixed_view_mut::<3, 2>(2, 0).copy_from(&suited);
+    covariance + along * along.transpose() * (0.5 * reach * reach)
 }
 
 /// The alternatives without those within `same` degrees of an earlier one.
@@ -117,10 +154,10 @@ const CHI2_OF_DIRECTION: f64 = 5.99;
 /// Most doubtful directions whose depth maps are compared, the likeliest by what else is known of them.
 const COMPARED: usize = 12;
 
-/// Whether any direction farther than the covariance has it explains the flow of at most [`MANY`] points as
+/// The farthest direction, rad, beyond the covariance that explains the flow of at most [`MANY`] points as
 /// well as the best of the `motions` (the estimate and maximum likelihood's), depth signs included. `own`:
 /// standard deviation of the estimate, degrees.
-fn far(observations: &Observations, motions: &[Motion], own: f64, rng: CounterRng) -> bool {
+fn far(observations: &Observations, motions: &[Motion], own: f64, rng: CounterRng) -> Option<f64> {
     let fewer = (observations.n as f64 / observations.n.min(MANY) as f64).sqrt();
     let searched = &*at_most(observations, MANY, rng);
     let (first, spread) = (motions[0].u(), (searched.n as f64).sqrt());
@@ -133,7 +170,7 @@ fn far(observations: &Observations, motions: &[Motion], own: f64, rng: CounterRn
         Some((signs[better], cost + behind[better]))
     };
     let known: Vec<(Motion, f64)> = motions.iter().filter_map(|motion| tested(&motion.u(), f64::INFINITY)).collect();
-    let Some((best, least)) = known.iter().min_by(|a, b| a.1.total_cmp(&b.1)) else { return false };
+    let (best, least) = known.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
     let limit = least + PLAUSIBLE;
     let mut doubts = evaluate(|u| {
         let angle = first.cross(u).norm().atan2(first.dot(u).abs()).to_degrees();
@@ -142,11 +179,13 @@ fn far(observations: &Observations, motions: &[Motion], own: f64, rng: CounterRn
         let decides = cost < limit && is_farther(FAR);
         (decides || cost < limit + fluctuation(searched, best, &motion)).then_some((motion, cost, decides))
     });
-    if doubts.is_empty() || doubts.iter().any(|(.., decides)| *decides) {
-        return !doubts.is_empty();
+    let angle = |motion: &Motion| motion.angle_to(&motions[0]);
+    let decided = doubts.iter().filter(|(.., decides)| *decides).map(|(motion, ..)| angle(motion)).reduce(f64::max);
+    if doubts.is_empty() || decided.is_some() {
+        return decided;
     }
     if !keeps("motion3d.region_by_chance") {
-        return false;
+        return None;
     }
     doubts.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut doubts: Vec<_> = doubts.into_iter().take(COMPARED).map(|(motion, cost, _)| (motion, cost)).collect();
@@ -155,7 +194,8 @@ fn far(observations: &Observations, motions: &[Motion], own: f64, rng: CounterRn
     let cost = |(motion, cost): &(Motion, f64)| cost + smoother.cost(depths(searched, motion).measured());
     let limit = known.iter().map(cost).fold(f64::INFINITY, f64::min) + spread;
     doubts.retain(|doubt| cost(doubt) < limit);
-    doubts.iter().any(|(motion, _)| is_consistent(searched, motion, &mut smoother))
+    doubts.retain(|(motion, _)| is_consistent(searched, motion, &mut smoother));
+    doubts.iter().map(|(motion, _)| angle(motion)).reduce(f64::max)
 }
 
 /// Two standard deviations of the difference of two directions' `J` by chance, `2 sqrt(sum sin^2 phi)` with

@@ -23,7 +23,7 @@ pub enum Status {
     Ambiguous,
     /// The points do not determine all unknowns (then there is no covariance, or no motion), the direction's
     /// standard deviation exceeds 20 degrees or 1.5 times the field, its confidence interval has no end, or
-    /// directions farther than the covariance has it explain the flow as well.
+    /// directions farther than the covariance had it explain the flow as well (it now reaches them).
     IllConditioned,
     /// The depths are mostly noise: maximum likelihood's covariance is not known, and that of the smoothed
     /// weights is given.
@@ -87,7 +87,8 @@ pub struct MotionEstimate {
     pub common: CommonEffect,
     /// The Cramér-Rao bound (8), with the information estimated; NaN where it is not known.
     pub bound: [[f64; 5]; 5],
-    /// Standard deviation of the direction, `sqrt(tr psi)`, degrees.
+    /// Standard deviation of the direction, `sqrt(tr psi)`, degrees; NaN where the covariance is not known,
+    /// as that of 7 points and fewer in unknown noise.
     pub direction_std: f64,
     /// Standard deviations of the rotation, rad/frame.
     pub rotation_std: [f64; 3],
