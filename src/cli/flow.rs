@@ -9,7 +9,7 @@ use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow};
 use crate::error::{Error, Result};
 use crate::flow::{Estimator, EstimatorOptions};
-use crate::pipeline::{OutputPlan, OutputWish, TableTarget};
+use crate::pipeline::{OutputPlan, OutputWish, TableTarget, is_folder};
 use crate::temporal::StreamPlan;
 use crate::types::SamplingGrid;
 use clap::Args;
@@ -119,9 +119,11 @@ pub fn plan_output(
     let standard_output = points && output.output.is_none() && !json;
     let path = if standard_output { Some(Path::new("-")) } else { output.output.as_deref() };
     let csv = vec!["csv".to_string()];
+    // The name of a file says its format.
+    let is_file = path.is_some_and(|path| path != Path::new("-") && !is_folder(path));
     let plan = OutputPlan::decide(&OutputWish {
         path,
-        formats: if points && output.format.is_empty() { &csv } else { &output.format },
+        formats: if points && output.format.is_empty() && !is_file { &csv } else { &output.format },
         pictures: &output.picture,
         replace: output.force,
         fields,
@@ -147,6 +149,7 @@ pub fn expect_output(plan: &OutputPlan, json: bool, has_other: bool) -> Result<(
 impl FlowCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
+        self.output.refuse_inputs(&self.input.input)?;
         let opened = open_input(&self.input)?;
         let Prepared { plan: stream, is_double, description } =
             prepare(&opened, &self.input, &self.method, &self.grid, &self.compute)?;

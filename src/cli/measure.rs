@@ -3,7 +3,7 @@
 use super::arguments::{ComputeArguments, GridArguments, InputArguments, MessageArguments, MethodArguments};
 use super::flow::{Prepared, prepare_with_covariance};
 use super::interrupt::Watch;
-use super::open::open_input;
+use super::open::{open_input, refuse_inputs};
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow, table_target};
 use crate::error::{Error, Result};
@@ -11,7 +11,7 @@ use crate::flow::derived::Quantity;
 use crate::pipeline::Measurements;
 use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Options of `measure`.
 #[derive(Debug, Args)]
@@ -53,6 +53,8 @@ impl MeasureCommand {
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let quantities: Vec<Quantity> =
             self.quantity.iter().map(|name| Quantity::parse(&name.replace('-', "_"))).collect::<Result<_>>()?;
+        let output = [("output", self.output.as_deref())];
+        refuse_inputs(self.input.input.iter().map(Path::new), &output, self.force)?;
         let target = table_target(self.output.as_deref(), self.force, self.messages.json)?;
         let opened = open_input(&self.input)?;
         if let Some(quantity) = quantities.iter().find(|q| q.needs_fps() && opened.numbering.rate.is_none()) {
