@@ -74,8 +74,10 @@ __all__ = [
     "_motion3d_lateral",
     "_motion3d_lateral_bound",
     "_observability",
+    "_restore_gradient_tracker",
     "_restore_particle_step",
     "_restore_particle_tracker",
+    "_restore_stereo_tracker",
     "_write_particle_tracks",
     "_felzenszwalb",
     "_region_means",
@@ -436,7 +438,7 @@ def estimate(
         Default: environment variable JACOFLOW_SIMD, else the best of the processor.
     progress : None, True or function (done, total)
         True draws a line on standard error; a function is called after each frame. Ctrl-C stops
-        between frames.
+        also amid a frame.
 
     Raises
     ------
@@ -1191,6 +1193,7 @@ class _GradientTracker:
         """The target in the next frame, as a dictionary."""
     def state(self) -> dict[str, Any]:
         """The target at the last frame, as a dictionary."""
+    def __reduce__(self, /) -> tuple[Any, tuple[bytes, float]]: ...
 
 @final
 class _GaussMarkovFilter:
@@ -1256,6 +1259,7 @@ class _StereoTracker:
         """Clusters of all steps so far and their arcs."""
     def tracks(self) -> dict[int, tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
         """Tracks by id: times (T,), positions (T, 3), velocities (T, 3) and when that was (T,)."""
+    def __reduce__(self, /) -> tuple[Any, tuple[bytes, float | None]]: ...
 
 @final
 class _TrackGraph:
@@ -1373,6 +1377,10 @@ def _scene_carriers() -> dict[str, str]: ...
 def _scene_names() -> dict[str, str]: ...
 def _scene_parameters(name: str) -> dict[str, tuple[float | None, str]]: ...
 def _target_scene_names() -> dict[str, str]: ...
+def _restore_gradient_tracker(state: bytes, gain: float) -> _GradientTracker:
+    """The inverse of `_GradientTracker.__reduce__`."""
+def _restore_stereo_tracker(state: bytes, gain: float | None) -> _StereoTracker:
+    """The inverse of `_StereoTracker.__reduce__`."""
 def _restore_particle_step(state: bytes) -> _ParticleStep:
     """The inverse of `_ParticleStep.__reduce__`."""
 def _restore_particle_tracker(state: bytes, takes_grey: bool) -> _ParticleTracker:

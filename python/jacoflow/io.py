@@ -82,7 +82,8 @@ def frames(
 def write_frames(path: _Path, frames: Iterable[NDArray[Any]], *, frame_rate: float = 25.0) -> int:
     """Writes frames (H, W), or (H, W, 3) in colour, of one size and dtype, in their levels; returns how many.
 
-    `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16).
+    `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16); those
+    that an earlier call wrote there are removed.
     `frame_rate` in frames/s is noted where the format has room for it.
     """
     return _write_frames(path, frames, frame_rate)
@@ -161,4 +162,6 @@ def read_npz(path: _Path) -> FlowField:
 
 def write_npz(path: _Path, field: FlowField, *, options: str = "") -> None:
     """Writes a field (H, W) with all its planes and units, and `options` (free text on how it was made)."""
+    if not isinstance(field, FlowField):
+        raise TypeError(f"field: expected a FlowField, got {type(field).__name__}")
     field.save(path, options=options)

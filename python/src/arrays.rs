@@ -2,7 +2,7 @@
 
 use crate::errors::{Outcome, Raised};
 use jacoflow::buffer_pool;
-use jacoflow::error::Error;
+use jacoflow::error::{Error, check_memory, shape_text};
 use jacoflow::types::{AnyFrame, Frame, Mask, Sample};
 use numpy::ndarray::{ArrayView, IntoDimension, ShapeBuilder};
 use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
@@ -41,6 +41,12 @@ pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> Outcome<Boun
 /// numpy's name of the array's element type.
 pub fn dtype_name(array: &Bound<'_, PyUntypedArray>) -> String {
     array.dtype().str().map_or_else(|_| "unknown".into(), |name| name.to_string())
+}
+
+/// Refuses an array whose copy in working precision does not fit into memory: a view of one sample may have
+/// any shape.
+pub fn check_size(argument: &str, array: &Bound<'_, PyUntypedArray>) -> Outcome<()> {
+    Ok(check_memory(argument, array.len().checked_mul(size_of::<f64>()))?)
 }
 
 /// The elements in row-major order, for any strides.
@@ -84,6 +90,7 @@ impl ColourRule {
 /// One frame `(H, W)`, or `(H, W, 3 or 4)` where colour is allowed.
 pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
     let array = as_array(argument, object)?;
+    check_size(argument, &array)?;
     let shape = array.shape().to_vec();
     match shape[..] {
         [height, width] => {
@@ -103,11 +110,15 @@ pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> O
                 .unwrap_or_else(|| Err(wrong_dtype(argument, &array).into()))
         }
         [_, _, 3 | 4] => Err(PyValueError::new_err(format!(
-            "{argument}: expected a grey frame (H, W), got a colour frame {shape:?}; \
-             convert it with jacoflow.luminance(frame), or pass colour=\"luminance\" where there is that option"
+            "{argument}: expected a grey frame (H, W), got a colour frame {}; \
+             convert it with jacoflow.luminance(frame), or pass colour=\"luminance\" where there is that option",
+            shape_text(&shape)
         ))
         .into()),
-        _ => Err(PyValueError::new_err(format!("{argument}: expected a frame (H, W), got shape {shape:?}")).into()),
+        _ => {
+            let message = format!("{argument}: expected a frame (H, W), got shape {}", shape_text(&shape));
+            Err(PyValueError::new_err(message).into())
+        }
     }
 }
 
@@ -160,7 +171,8 @@ impl<'py> Frames<'py> {
             ColourRule::Luminance => "a list of frames or a stack (T, H, W) or (T, H, W, 3 or 4)",
         };
         let refuse = |advice: &str| {
-            let message = format!("frames: expected {wanted}, got an array of shape {shape:?}{advice}");
+            let shown = shape_text(&shape);
+            let message = format!("frames: expected {wanted}, got an array of shape {shown}{advice}");
             Err(PyValueError::new_err(message).into())
         };
         match shape[..] {
@@ -185,8 +197,9 @@ impl<'py> Frames<'py> {
 /// `mask`: a boolean array `(H, W)`, true where pixels may be used.
 pub fn mask(object: &Bound<'_, PyAny>) -> Outcome<Mask> {
     let array = as_array("mask", object)?;
+    check_size("mask", &array)?;
     let [height, width] = array.shape()[..] else {
-        return Err(PyValueError::new_err(format!("mask: expected shape (H, W), got {:?}", array.shape())).into());
+        return Err(Error::argument("mask", "shape (H, W)", shape_text(array.shape())).into());
     };
     let Some(values) = elements::<bool>(&array) else {
         return Err(PyTypeError::new_err(format!(
@@ -201,12 +214,13 @@ pub fn mask(object: &Bound<'_, PyAny>) -> Outcome<Mask> {
 /// An `(N, 2)` array of integers.
 pub fn integer_pairs(argument: &'static str, object: &Bound<'_, PyAny>) -> Outcome<Vec<(i64, i64)>> {
     let array = as_array(argument, object)?;
+    check_size(argument, &array)?;
     let kind: String = array.dtype().getattr("kind")?.extract()?;
     if array.shape() == [0] {
         return Ok(Vec::new());
     }
     if !matches!(array.shape(), [_, 2]) {
-        return Err(Error::argument(argument, "shape (N, 2), columns x and y", format!("{:?}", array.shape())).into());
+        return Err(Error::argument(argument, "shape (N, 2), columns x and y", shape_text(array.shape())).into());
     }
     if !matches!(kind.as_str(), "i" | "u") {
         return Err(PyTypeError::new_err(format!("{argument}: expected integers, got {}", dtype_name(&array))).into());
@@ -225,6 +239,7 @@ pub fn doubles(argument: &'static str, object: &Bound<'_, PyAny>) -> Outcome<(Ve
         if own { PyValueError::new_err(said()) } else { error }
     };
     let array = as_array(argument, object).map_err(ragged)?;
+    check_size(argument, &array)?;
     let kind: String = array.dtype().getattr("kind")?.extract()?;
     if !matches!(kind.as_str(), "f" | "i" | "u") {
         return Err(

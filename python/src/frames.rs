@@ -1,8 +1,12 @@
 //! `jacoflow.io`: frames in and out, grey or in colour.
 
 use super::arrays::{self, ColourRule};
-use super::{colour_arrays::colour_frame, colour_arrays::from_any_colour_frame, options};
+use super::{
+    colour_arrays::colour_frame, colour_arrays::from_any_colour_frame, options, options::Integer, options::named,
+};
 use crate::errors::Outcome;
+use crate::image::renamed;
+use crate::interrupt::abandonable;
 use jacoflow::error::Error;
 use jacoflow::io::{
     Colour, ColourSource, FrameSink, FrameSource, Grey, OpenOptions, open, open_colour, open_colour_sink, open_sink,
@@ -13,7 +17,7 @@ use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Which frames are read, and what is done with pictures of the other kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,12 +121,19 @@ pub struct FrameReader {
     spec: String,
     reading: Reading,
     options: OpenOptions,
-    place: Mutex<Place>,
+    place: Arc<Mutex<Place>>,
 }
 
 struct Place {
     source: Source,
     delivered: usize,
+}
+
+impl FrameReader {
+    /// The place, once no other thread reads.
+    fn lock(&self) -> MutexGuard<'_, Place> {
+        self.place.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 #[pymethods]
@@ -133,24 +144,25 @@ impl FrameReader {
 
     fn __next__<'py>(&self, py: Python<'py>) -> Outcome<Option<Bound<'py, PyAny>>> {
         py.check_signals()?;
-        let frame = py.detach(|| {
-            let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = Arc::clone(&self.place);
+        let frame = abandonable(py, move || {
+            let mut place = place.lock().unwrap_or_else(PoisonError::into_inner);
             let frame = place.source.next_frame()?;
             place.delivered += usize::from(frame.is_some());
-            jacoflow::Result::Ok(frame)
+            Ok(frame)
         })?;
         frame.map(|frame| frame.into_array(py)).transpose()
     }
 
     /// Frames left (a count, no unit), where that is known without reading them, else 0.
     fn __length_hint__(&self, py: Python<'_>) -> usize {
-        py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).source.len_hint().unwrap_or(0))
+        py.detach(|| self.lock().source.len_hint().unwrap_or(0))
     }
 
     /// Frames per second, where the source says so, else None.
     #[getter]
     fn frame_rate(&self, py: Python<'_>) -> Option<f64> {
-        py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).source.frame_rate())
+        py.detach(|| self.lock().source.frame_rate())
     }
 
     fn __repr__(&self) -> String {
@@ -164,7 +176,7 @@ impl FrameReader {
         if self.spec == "-" {
             return Err(PyTypeError::new_err("standard input cannot be pickled").into());
         }
-        let delivered = py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).delivered);
+        let delivered = py.detach(|| self.lock().delivered);
         let OpenOptions { start, stop, step, .. } = self.options;
         let (colour, grey) = self.reading.words();
         let reopen = py.import("jacoflow._jacoflow")?.getattr("_open_frames")?;
@@ -180,26 +192,29 @@ pub fn open_frames(
     spec: PathBuf,
     colour: Option<&str>,
     grey: Option<&str>,
-    start: i64,
-    stop: Option<i64>,
-    step: i64,
+    start: Integer,
+    stop: Option<Integer>,
+    step: Integer,
 ) -> Outcome<FrameReader> {
-    let not_negative = |name: &'static str, value: i64| {
-        usize::try_from(value).map_err(|_| Error::argument(name, "an integer of 0 or more", value))
-    };
     let reading = Reading::parse(colour, grey)?;
     let mut options = OpenOptions::default();
-    options.start = not_negative("start", start)?;
-    options.stop = stop.map(|n| not_negative("stop", n)).transpose()?;
-    options.step = options::count("step", options::Integer(step))?;
+    options.start = options::natural("start", start)?;
+    options.stop = stop.map(|n| options::natural("stop", n)).transpose()?;
+    options.step = options::count("step", step)?;
     let spec = spec.to_string_lossy().into_owned();
-    let source = py.detach(|| Source::open(&spec, reading, &options))?;
-    Ok(FrameReader { spec, reading, options, place: Mutex::new(Place { source, delivered: 0 }) })
+    let opened = spec.clone();
+    let source = abandonable(py, move || Source::open(&opened, reading, &options))?;
+    Ok(FrameReader { spec, reading, options, place: Arc::new(Mutex::new(Place { source, delivered: 0 })) })
 }
 
 /// Writes frames to a sink: the first one says whether they are grey or in colour.
 #[pyfunction(name = "_write_frames")]
-pub fn write_frames(py: Python<'_>, path: PathBuf, frames: &Bound<'_, PyAny>, frame_rate: f64) -> Outcome<usize> {
+pub fn write_frames(
+    py: Python<'_>,
+    path: PathBuf,
+    frames: &Bound<'_, PyAny>,
+    #[pyo3(from_py_with = named::frame_rate)] frame_rate: f64,
+) -> Outcome<usize> {
     let spec = path.to_string_lossy().into_owned();
     let mut items = frames.try_iter()?;
     let first = items.next().transpose()?;
@@ -208,10 +223,13 @@ pub fn write_frames(py: Python<'_>, path: PathBuf, frames: &Bound<'_, PyAny>, fr
         None => false,
     };
     let items = first.into_iter().map(Ok).chain(items);
+    let named = |error: Error| renamed(error, "output", "path");
     if is_colour {
-        write_all(py, items, open_colour_sink(&spec, frame_rate)?, |item| colour_frame("frames", item))
+        write_all(py, items, open_colour_sink(&spec, frame_rate).map_err(named)?, |item| colour_frame("frames", item))
     } else {
-        write_all(py, items, open_sink(&spec, frame_rate)?, |item| arrays::frame("frames", item, ColourRule::Refuse))
+        write_all(py, items, open_sink(&spec, frame_rate).map_err(named)?, |item| {
+            arrays::frame("frames", item, ColourRule::Refuse)
+        })
     }
 }
 
@@ -242,7 +260,7 @@ pub fn read_one_image<'py>(
     grey: Option<&str>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let reading = Reading::parse(colour, grey)?;
-    let frame = py.detach(|| match reading {
+    let frame = abandonable(py, move || match reading {
         Reading::Grey(_) => read_image(&path, reading.colour()).map(AnyKind::Grey),
         Reading::Rgb(grey) => read_image(&path, grey).map(AnyKind::Rgb),
     })?;

@@ -17,6 +17,7 @@ mod flow_filter;
 mod frames;
 mod gauss_markov;
 mod image;
+mod interrupt;
 mod io;
 mod keywords;
 mod mixture;
@@ -73,9 +74,9 @@ mod _jacoflow {
         scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters},
         segment::{segment_felzenszwalb, segment_region_means},
         stereo::{edge_disparity, edge_pixels, estimate_row_offset, read_disparity, write_disparity},
-        stereo_track::{PyStereoTracker, PyTrackGraph},
+        stereo_track::{PyStereoTracker, PyTrackGraph, restore_stereo_tracker},
         target_scenes::{TargetScene, target_scene_names},
-        track::{PyGradientTracker, detect},
+        track::{PyGradientTracker, detect, restore_gradient_tracker},
     };
 
     #[pymodule_export]

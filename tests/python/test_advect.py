@@ -127,11 +127,11 @@ def test_inputs_are_not_modified_and_any_numbers_are_taken(truth):
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        (([1.0, 2.0],), ValueError, r"points: expected shape \(N, 2\).*got \[2\]"),
+        (([1.0, 2.0],), ValueError, r"points: expected shape \(N, 2\).*got \(2,\)"),
         ((np.zeros((3, 3)),), ValueError, "points: "),
         ((np.zeros((2, 2), complex),), TypeError, "points: expected real numbers"),
         ((["here"],), TypeError, "points: "),
-        ((np.zeros((3, 2)), np.zeros((2, 2, 2))), ValueError, r"covariance: .*shape \[2, 2, 2\] for 3 points"),
+        ((np.zeros((3, 2)), np.zeros((2, 2, 2))), ValueError, r"covariance: .*shape \(2, 2, 2\) for 3 points"),
         ((np.zeros((3, 2)), 1.0), ValueError, "covariance: "),
         ((np.zeros((3, 2)), [[1.0, 0.5], [0.0, 1.0]]), ValueError, "covariance: .*symmetric"),
         ((np.zeros((3, 2)), [[-1.0, 0.0], [0.0, 1.0]]), ValueError, "covariance: "),

@@ -17,7 +17,7 @@ macro_rules! estimator_options {
             initial: Object as Object = None,
             temporal: Object as Object = None,
             covariance: Option<bool> as Option<bool> = None,
-            noise: Option<f64> as Option<f64> = None,
+            noise: Object as Object = None,
             diagnostics: bool as bool = false,
         }
     };
@@ -107,11 +107,11 @@ impl Arguments {
             mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
             initial: self.initial.as_ref().map(|flow| initial(flow.bind(py))).transpose()?,
             pixel_pitch: options::pixel_pitch(py, &self.pixel_pitch)?.unwrap_or(default.pixel_pitch),
-            frame_period: options::frame_period(self.fps)?,
+            frame_period: options::frame_period(py, &self.fps)?,
             covariance: self.covariance.unwrap_or(method.info().has_covariance),
             systematic,
             diagnostics: self.diagnostics,
-            noise: self.noise,
+            noise: options::real(py, "noise", &self.noise)?,
             threads: options::threads(self.threads)?,
             simd: options::simd(self.simd.as_deref())?,
         })

@@ -9,6 +9,7 @@ use super::keywords::with_common;
 use super::options::{Integer, Object};
 use super::progress::Reporter;
 use crate::errors::Outcome;
+use crate::interrupt::interruptible;
 use arguments::{Arguments, estimator_options};
 use jacoflow::error::Error;
 use jacoflow::temporal::AnyFlowStream;
@@ -59,7 +60,7 @@ fn run(py: Python<'_>, frames: &Frames<'_>, stream: &mut AnyFlowStream, progress
     let mut fields = Growing::None;
     for index in 0..frames.count {
         let frame = frames.get(index)?;
-        let field = py.detach(|| stream.push(frame))?;
+        let field = interruptible(py, || stream.push(frame))?;
         progress.step(index + 1, frames.count)?;
         if let Some(field) = field {
             if !frames.is_array && frames.count == needed {
@@ -124,7 +125,7 @@ macro_rules! define_estimate {
         ///     Default: environment variable JACOFLOW_SIMD, else the best of the processor.
         /// progress : None, True or function (done, total)
         ///     True draws a line on standard error; a function is called after each frame. Ctrl-C stops
-        ///     between frames.
+        ///     also amid a frame.
         ///
         /// Raises
         /// ------

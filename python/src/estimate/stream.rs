@@ -3,6 +3,7 @@
 use super::{arguments::Arguments, arguments::estimator_options};
 use crate::arrays::{self, ColourRule};
 use crate::errors::Outcome;
+use crate::interrupt::{alone, interruptible};
 use crate::options::{self, Integer, Object};
 use crate::{field::FlowField, image::renamed, keywords::constructor, keywords::with_common};
 use jacoflow::error::Error;
@@ -46,16 +47,27 @@ impl FlowEstimator {
     /// come, before that None.
     ///
     /// A frame that raises an error (ValueError for another size, TypeError for another dtype) is not kept.
-    fn push(&mut self, frame: &Bound<'_, PyAny>) -> Outcome<Option<FlowField>> {
-        let py = frame.py();
-        let frame = arrays::frame("frame", frame, self.colour)?;
-        let field = py.detach(|| self.stream.push(frame)).map_err(|error| renamed(error, "frames", "frame"))?;
-        Ok(field.map(FlowField::any))
+    /// Ctrl-C stops the work and forgets every frame.
+    fn push(slf: &Bound<'_, Self>, frame: &Bound<'_, PyAny>) -> Outcome<Option<FlowField>> {
+        let (py, mut this) = (slf.py(), alone(slf)?);
+        let frame = arrays::frame("frame", frame, this.colour)?;
+        let (stream, mut completed) = (&mut this.stream, false);
+        let field = interruptible(py, || {
+            let field = stream.push(frame).map_err(|error| renamed(error, "frames", "frame"));
+            completed = true;
+            field
+        });
+        if !completed {
+            // Stopped by Ctrl-C in the middle of a frame.
+            this.stream.reset();
+        }
+        Ok(field?.map(FlowField::any))
     }
 
     /// Forgets every frame (H, W); the next one begins a new sequence, frame index 0.
-    fn reset(&mut self) {
-        self.stream.reset();
+    fn reset(slf: &Bound<'_, Self>) -> Outcome<()> {
+        alone(slf)?.stream.reset();
+        Ok(())
     }
 
     /// Frames that must come before the first field (a count, no unit).
