@@ -11,7 +11,7 @@ CHECKED := --profile ci --features reference
 ASSERTED := --config profile.ci.package.jacoflow.opt-level=0 --config profile.ci.package.jacoflow.overflow-checks=true \
 	--config profile.ci.package.jacoflow.debug-assertions=true
 
-.PHONY: test checks of-rust of-python demo format clippy features rustdoc rust-test guide wheel packages install pytest stubtest typing examples develop docs compare readme ablation clean
+.PHONY: fuzz test checks of-rust of-python demo format clippy features rustdoc rust-test guide wheel packages install pytest stubtest typing examples develop docs compare readme ablation clean
 
 # Two steps at a time, each of which often leaves a core idle; each prints when it ends. What is only checked is
 # built in the development profile, whose folder cargo locks apart from that of the wheel.
@@ -84,6 +84,10 @@ install: wheel packages
 # One process for each core; files stay whole, so that what a file's tests share is made once.
 pytest: install
 	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
+
+# Hostile files and arguments for an hour; the tests take half a minute of it. SEED names another hour.
+fuzz: install
+	$(BIN)/python tests/fuzz --seconds 3600 --seed $(or $(SEED),0)
 
 stubtest: install
 	cd $(VENV) && bin/python -m mypy.stubtest --allowlist $(CURDIR)/tests/stubtest_allowlist.txt jacoflow
