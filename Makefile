@@ -11,7 +11,7 @@ CHECKED := --profile ci --features reference
 ASSERTED := --config profile.ci.package.jacoflow.opt-level=0 --config profile.ci.package.jacoflow.overflow-checks=true \
 	--config profile.ci.package.jacoflow.debug-assertions=true
 
-.PHONY: test checks of-rust of-python demo format clippy features rustdoc rust-test guide wheel packages install pytest stubtest typing examples develop docs compare readme ablation clean
+.PHONY: fuzz test checks of-rust of-python demo format clippy features rustdoc rust-test guide wheel packages install pytest stubtest typing examples develop docs compare readme ablation clean
 
 # Two steps at a time, each of which often leaves a core idle; each prints when it ends. What is only checked is
 # built in the development profile, whose folder cargo locks apart from that of the wheel.
@@ -85,6 +85,10 @@ install: wheel packages
 pytest: install
 	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
+# Hostile files and arguments for an hour; the tests take half a minute of it. SEED names another hour.
+fuzz: install
+	$(BIN)/python tests/fuzz --seconds 3600 --seed $(or $(SEED),0)
+
 stubtest: install
 	cd $(VENV) && bin/python -m mypy.stubtest --allowlist $(CURDIR)/tests/stubtest_allowlist.txt jacoflow
 
@@ -94,9 +98,9 @@ typing: packages
 examples: install
 	@for file in examples/*.py; do [ -e "$$file" ] || continue; echo "$$file"; $(BIN)/python "$$file" >/dev/null || exit 1; done
 
-# A quick build for work on the binding: the profile of single tests, installed in place.
+# A quick build for work on the binding, installed in place.
 develop: $(BIN)/maturin
-	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --profile test --extras test
+	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop -q --profile develop --extras test
 
 # Ours, as a user would get it, and OpenCV and filterpy in one process; writes a dated table. DATA names a folder of recorded sequences, if there is one.
 compare: BUILT := --release

@@ -19,6 +19,7 @@ from benchmarks import report
 SECTIONS: dict[str, tuple[str, ...]] = {
     "flow": ("flow",),
     "disturbed": ("disturbed",),
+    "limits": ("limits",),
     "memory": ("memory",),
     "filter": ("filter", "flow_filter"),
     "controlled": ("controlled",),

@@ -1,9 +1,9 @@
-"""Writes the tables of README.md out of the newest dated file of results.
+"""Writes the tables of README.md and docs/limits.md out of the newest dated file of results.
 
     python -m benchmarks.readme [--check]
 
 A table stands between `<!-- table: NAME -->` and `<!-- end -->`; NAME is a key of `TABLES` here. `--check`
-changes nothing and fails where README.md is not what this command would write. `make readme` runs it.
+changes nothing and fails where they are not what this command would write. `make readme` runs it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from pathlib import Path
 
 from benchmarks.report import Record, Rows, lines, newest
 
-README = Path(__file__).parents[1] / "README.md"
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = (ROOT / "README.md", ROOT / "docs" / "limits.md")
 BLOCK = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 RECORDINGS = {
     "RubberWhale": "RubberWhale",
@@ -62,6 +63,7 @@ RECORDED_MATCHERS = {
     "OpenCV SGBM": "OpenCV SGBM",
     "OpenCV BM 15": "OpenCV BM",
 }
+LIMITS = "Limits of a step"
 HARD = "Tracking, 28 hard scenes, share of frames found / median error of the centre in px"
 SCENES = "Particle tracker, ten scenes"
 CHANCE = "3-D motion: what is said of scenes by chance"
@@ -109,6 +111,15 @@ def intervals(record: Record) -> list[str]:
         found = where(rows, sample=sample, preset="balanced", frames=2)
         body.append([name, *(number(found.get(each), 2) for each in names)])
     return lines(["", "u", "v", "Jacobian", "squared error / variance", "flow, all pixels"], body)
+
+
+def limits(record: Record) -> list[str]:
+    """Errors of ours and others by the size of the step."""
+    names = {"pair, px": "pair", "pair, valid": "valid", "pair, silent": "silent", "triple, px": "triple"}
+    names |= {"triple, valid": "valid", "triple, silent": "silent"}
+    names |= {rival: rival for rival in ("OpenCV DIS medium", "OpenCV Farneback")}
+    body = [[str(row["step"]), *(number(row.get(name), 3) for name in names)] for row in record.sections[LIMITS]]
+    return lines(["median error, px", *names.values()], body)
 
 
 def _both(row: dict[str, object], first: str, digits: int, second: str, more: int) -> str:
@@ -262,13 +273,14 @@ TABLES: dict[str, tuple[Callable[[Record], list[str]], tuple[str, ...]]] = {
     "stereo": (stereo, ("Disparity of edge pixels, scenes with exact truth",)),
     "stereo_tracking": (stereo_tracking, tuple(f"Stereo tracking, {scene}" for scene in STEREO_SCENES)),
     "motion": (motion, (CHANCE, VIEWS)),
+    "limits": (limits, (LIMITS,)),
     "parts": (parts, (FILTER, "Weighted mixtures, a round")),
 }
-"""Table of the README -> its maker, and sections of the results that it needs."""
+"""Table of a document -> its maker, and sections of the results that it needs."""
 
 
 def written(text: str, record: Record) -> str:
-    """The README with its tables written from the record."""
+    """A document with its tables written from the record."""
 
     def block(match: re.Match[str]) -> str:
         maker, needed = TABLES[match.group(2)]
@@ -283,23 +295,25 @@ def written(text: str, record: Record) -> str:
 
 
 def main() -> int:
-    """Writes or checks README.md."""
+    """Writes or checks the documents."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--check", action="store_true", help="fail where README.md would change")
+    parser.add_argument("--check", action="store_true", help="fail where a document would change")
     is_check = parser.parse_args().check
     record = newest()
     if record is None:
         sys.exit("benchmarks/results: expected a dated file, got none")
-    text = README.read_text(encoding="utf-8")
-    new = written(text, record)
-    if is_check:
-        if new != text:
-            print("README.md: expected the tables that `make readme` writes, got others")
-        return int(new != text)
-    README.write_text(new, encoding="utf-8")
-    return 0
+    differ = 0
+    for document in DOCUMENTS:
+        text = document.read_text(encoding="utf-8")
+        new = written(text, record)
+        if is_check and new != text:
+            print(f"{document.name}: expected the tables that `make readme` writes, got others")
+            differ = 1
+        elif not is_check:
+            document.write_text(new, encoding="utf-8")
+    return differ
 
 
 if __name__ == "__main__":

@@ -47,6 +47,8 @@ pub enum Error {
     Numerical(String),
     /// A program or optional part that is not there (Python: `jacoflow.MissingDependencyError`).
     Missing(String),
+    /// Memory does not suffice for what an argument requests (Python: `MemoryError`).
+    Memory(String),
     /// The user stopped the work (Ctrl-C; Python: `KeyboardInterrupt`).
     Interrupted,
 }
@@ -62,7 +64,7 @@ impl fmt::Display for Error {
             Self::Format { path, message } => write!(f, "{}: {message}", path.display()),
             Self::NotObservable(reason) => write!(f, "not observable: {reason}"),
             Self::Numerical(reason) => write!(f, "numerical failure: {reason}"),
-            Self::Missing(what) => f.write_str(what),
+            Self::Missing(what) | Self::Memory(what) => f.write_str(what),
             Self::Interrupted => f.write_str("interrupted"),
         }
     }
@@ -94,6 +96,12 @@ impl Error {
         }
     }
 
+    /// An argument whose values, `bytes` of them, do not fit into memory.
+    pub fn memory(argument: &str, bytes: Option<usize>) -> Self {
+        let size = bytes.map_or("more than the address space".into(), |bytes| format!("{bytes} bytes"));
+        Self::Memory(format!("{argument}: expected what fits into memory, got {size}"))
+    }
+
     /// A failed file operation on `path`.
     pub fn io(path: impl AsRef<Path>, source: std::io::Error) -> Self {
         Self::Io { path: path.as_ref().to_path_buf(), source }
@@ -102,6 +110,20 @@ impl Error {
     /// A file whose content breaks its format.
     pub fn format(path: impl AsRef<Path>, message: impl Into<String>) -> Self {
         Self::Format { path: path.as_ref().to_path_buf(), message: message.into() }
+    }
+}
+
+/// Refuses an argument that requests more memory than can be had: where an allocation fails, the process
+/// ends.
+///
+/// `bytes`: what its largest buffer takes; `None`: more than an address can count.
+///
+/// # Errors
+/// [`Error::Memory`] naming `argument`.
+pub fn check_memory(argument: &str, bytes: Option<usize>) -> Result<()> {
+    match bytes.map(|bytes| Vec::<u8>::new().try_reserve_exact(bytes)) {
+        Some(Ok(())) => Ok(()),
+        _ => Err(Error::memory(argument, bytes)),
     }
 }
 
@@ -115,6 +137,12 @@ pub(crate) fn number(value: f64) -> String {
 pub(crate) fn numbers<'a>(values: impl IntoIterator<Item = &'a f64>) -> String {
     let words: Vec<String> = values.into_iter().map(|&value| number(value)).collect();
     format!("({})", words.join(", "))
+}
+
+/// A shape in a message, as Python writes it: `(2, 48, 64)`, `(3,)`.
+pub fn shape_text(axes: &[usize]) -> String {
+    let words: Vec<String> = axes.iter().map(usize::to_string).collect();
+    format!("({}{})", words.join(", "), if axes.len() == 1 { "," } else { "" })
 }
 
 /// Cuts values of hundreds of digits: their beginning says as much.
@@ -145,6 +173,7 @@ mod tests {
                 format!("sigma: expected less, got {word}")
             );
         }
+        assert_eq!([&[][..], &[3], &[2, 48, 64]].map(shape_text), ["()", "(3,)", "(2, 48, 64)"]);
         assert_eq!(numbers(&[0.0, -1.5, 1e300, 1e-9]), "(0, -1.5, 1e300, 1e-9)");
     }
 }

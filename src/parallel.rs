@@ -1,6 +1,11 @@
 //! Threads: fixed row bands, so that results are bit-identical for any number of threads.
 
+mod interrupt;
+
+pub use interrupt::{Interrupt, checkpoint};
+
 use crate::error::{Error, Result};
+use interrupt::{current, under};
 use rayon::prelude::*;
 use std::ffi::OsString;
 use std::sync::atomic::{AtomicPtr, Ordering};
@@ -75,7 +80,8 @@ fn from_environment(value: Option<OsString>) -> Result<Option<usize>> {
 
 /// Behind a pointer, as rayon would compile all that is done inside several times over.
 fn install(threads: usize, work: &mut (dyn FnMut() + Send)) {
-    pool(threads).install(work);
+    let interrupt = current();
+    pool(threads).install(|| under(interrupt, work));
 }
 
 /// The shared pool of `count` threads; made on first use and kept.
@@ -174,10 +180,13 @@ fn in_bands<T: Send>(band_rows: usize, buffer: &mut [T], row_len: usize, work: &
     if row_len == 0 {
         return;
     }
-    let rows = buffer.len() / row_len;
+    let (rows, interrupt) = (buffer.len() / row_len, current());
     let one_band = |(band, slice): (usize, &mut [T])| {
         let start = band * band_rows;
-        work(band, start..(start + band_rows).min(rows), slice);
+        under(interrupt.clone(), || {
+            checkpoint();
+            work(band, start..(start + band_rows).min(rows), slice);
+        });
     };
     let outside = rayon::current_thread_index().is_none();
     if outside && buffer.len() <= MAX_SERIAL {

@@ -83,7 +83,7 @@ def together(data: Path) -> list[Row]:
     rows: list[Row] = []
     for kind, count in FRAMES.items():
         fields = [
-            jacoflow.estimate(images[k : k + count], method=jacoflow.CoarseToFine(preset="balanced"))
+            jacoflow.flow(*images[k : k + count], method=jacoflow.CoarseToFine(preset="balanced"))
             for k in range(len(images) - count + 1)
         ]
         length = fields[0].correlation_length

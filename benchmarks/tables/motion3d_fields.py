@@ -40,7 +40,7 @@ WAYS: dict[str, dict[str, Any]] = {
 def field(method: Method, noise: float, step: float, seed: int) -> tuple[jacoflow.FlowField, rooms.Room]:
     """The flow field of a room, and this."""
     made = rooms.room(seed, step, TURN * step)
-    return jacoflow.estimate(rooms.frames(made, noise, seed), method=method), made
+    return jacoflow.flow(*rooms.frames(made, noise, seed), method=method), made
 
 
 def fields(

@@ -31,6 +31,12 @@ def axes_or_new(axes: Axes | None) -> Axes:
     return new
 
 
+def check_parts(name: str, value: object, kind: str, parts: tuple[str, ...]) -> None:
+    """TypeError naming the argument for an object without the parts that are drawn."""
+    if not all(hasattr(value, part) for part in parts):
+        raise TypeError(f"{name}: expected an object like {kind}, got {type(value).__name__}")
+
+
 def frame_extent(shape: tuple[int, ...]) -> tuple[float, float, float, float]:
     return (-0.5, shape[1] - 0.5, shape[0] - 0.5, -0.5)
 

@@ -44,7 +44,8 @@ __all__ = [
     "luminance",
     "quantise",
     "smooth",
-    "FrameReader",
+    "_FrameSource",
+    "_kind_of",
     "_open_frames",
     "_read_pfm",
     "_read_flow",
@@ -76,8 +77,10 @@ __all__ = [
     "_motion3d_lateral",
     "_motion3d_lateral_bound",
     "_observability",
+    "_restore_gradient_tracker",
     "_restore_particle_step",
     "_restore_particle_tracker",
+    "_restore_stereo_tracker",
     "_write_particle_tracks",
     "_felzenszwalb",
     "_region_means",
@@ -107,6 +110,8 @@ _Precision: TypeAlias = Literal["float32", "float64"]
 _Simd: TypeAlias = Literal["scalar", "avx2", "avx512"]
 _Progress: TypeAlias = bool | Callable[[int, int], object]
 _Callback: TypeAlias = Callable[..., ArrayLike]
+_Function: TypeAlias = Callable[[NDArray[np.float64], NDArray[np.float64]], ArrayLike]
+_Items: TypeAlias = Sequence[ArrayLike | None] | NDArray[Any]
 
 class JacoflowError(Exception):
     """Base class of the errors that are jacoflow's own (bad arguments are ValueError or TypeError, files OSError)."""
@@ -133,38 +138,38 @@ class FlowField:
     """
     @property
     def flow(self) -> _Floats:
-        """Flow, array (..., H, W, 2): (u, v) in px/frame along x (right) and y (down), or in units of
-        `pixel_pitch` per frame.
+        """Flow, array (..., H, W, 2): (u, v) along x (right) and y (down), in `unit("u")`: px/frame, lengths in
+        `length_unit` with a pixel pitch, times in seconds with a frame period.
 
         NaN where `status` says why. A read-only view.
         """
     @property
     def jacobian(self) -> _Floats:
-        """Jacobian of the flow, array (..., H, W, 2, 2) in 1/frame: [[u_x, u_y], [v_x, v_y]].
+        """Jacobian of the flow, array (..., H, W, 2, 2) in 1/frame or 1/s: [[u_x, u_y], [v_x, v_y]].
 
         A read-only view; zeros where the model assumes no derivatives.
         """
     @property
     def u(self) -> _Floats:
-        """Flow along x (right), array (..., H, W), px/frame."""
+        """Flow along x (right), array (..., H, W), in `unit("u")`, px/frame by default."""
     @property
     def v(self) -> _Floats:
-        """Flow along y (down), array (..., H, W), px/frame."""
+        """Flow along y (down), array (..., H, W), in `unit("u")`, px/frame by default."""
     @property
     def u_x(self) -> _Floats:
-        """du/dx, array (..., H, W), 1/frame."""
+        """du/dx, array (..., H, W), 1/frame or 1/s."""
     @property
     def v_x(self) -> _Floats:
-        """dv/dx, array (..., H, W), 1/frame."""
+        """dv/dx, array (..., H, W), 1/frame or 1/s."""
     @property
     def u_y(self) -> _Floats:
-        """du/dy, array (..., H, W), 1/frame."""
+        """du/dy, array (..., H, W), 1/frame or 1/s."""
     @property
     def v_y(self) -> _Floats:
-        """dv/dy, array (..., H, W), 1/frame."""
+        """dv/dy, array (..., H, W), 1/frame or 1/s."""
     @property
     def covariance(self) -> _Floats | None:
-        """Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), px/frame and 1/frame squared; None
+        """Covariance of (u, v, u_x, v_x, u_y, v_y), array (..., H, W, 6, 6), in squares of their units; None
         if it was not requested.
 
         Rows and columns of parameters that the model lacks are zero. A new array at every access.
@@ -197,32 +202,33 @@ class FlowField:
         """
     @property
     def divergence(self) -> NDArray[np.float64]:
-        """Divergence u_x + v_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
+        """Divergence L_xx + L_yy of the rate L of the step, float64 array (..., H, W), 1/frame, or 1/s with a
+        frame period."""
     @property
     def curl(self) -> NDArray[np.float64]:
-        """Curl v_x - u_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns
+        """Curl L_yx - L_xy, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns
         clockwise on the screen."""
     @property
     def shear_magnitude(self) -> NDArray[np.float64]:
-        """Shear sqrt((u_x - v_y)^2 + (u_y + v_x)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame
+        """Shear sqrt((L_xx - L_yy)^2 + (L_xy + L_yx)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame
         period."""
     @property
     def shear_axis(self) -> NDArray[np.float64]:
-        """Direction of the greatest stretch, atan2(u_y + v_x, u_x - v_y) / 2, float64 array (..., H, W), rad in
-        (-pi/2, pi/2], from x towards y.
-        """
+        """Direction of the greatest stretch, atan2(L_xy + L_yx, L_xx - L_yy) / 2, float64 array (..., H, W),
+        rad in (-pi/2, pi/2], from x towards y."""
     @property
     def strain_xx(self) -> NDArray[np.float64]:
-        """Stretch u_x along x, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
+        """Stretch L_xx along x, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
     @property
     def strain_yy(self) -> NDArray[np.float64]:
-        """Stretch v_y along y, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
+        """Stretch L_yy along y, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
     @property
     def strain_xy(self) -> NDArray[np.float64]:
-        """Shear strain (u_y + v_x) / 2, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
+        """Shear strain (L_xy + L_yx) / 2, float64 array (..., H, W), 1/frame, or 1/s with a frame period."""
     @property
     def angular_velocity(self) -> NDArray[np.float64]:
-        """Angular velocity (v_x - u_y) / 2, float64 array (..., H, W), rad/frame, or rad/s with a frame period."""
+        """Angular velocity (L_yx - L_xy) / 2, float64 array (..., H, W), rad/frame, or rad/s with a frame
+        period."""
     @property
     def rpm(self) -> NDArray[np.float64]:
         """Angular velocity, float64 array (..., H, W), revolutions per minute; ValueError without fps or
@@ -240,8 +246,8 @@ class FlowField:
         """Distance of the point that does not move, float64 array (..., H, W), px, or units of the pixel pitch."""
     @property
     def time_to_contact(self) -> NDArray[np.float64]:
-        """Time 2 / (u_x + v_y) until contact with a surface parallel to the image, float64 array (..., H, W),
-        frames, or s with a frame period; negative while it recedes."""
+        """Time from the field's frame to contact with a surface parallel to the image, float64 array (..., H,
+        W), frames, or s with a frame period; negative while it recedes."""
     @property
     def speed(self) -> NDArray[np.float64]:
         """Speed sqrt(u^2 + v^2), float64 array (..., H, W), px/frame, or px/s with a frame period."""
@@ -265,22 +271,44 @@ class FlowField:
         region: ArrayLike | None = None,
         aggregate: Literal["inverse_variance", "median"] | None = None,
     ) -> tuple[float, float, int]:
-        """One number for a region: (value, standard deviation, number of sites) of the parameter or derived
-        quantity `name`, in its unit.
+        """Mean over a region: (value, standard deviation, number of sites) of the parameter or derived quantity
+        `name`, in its unit.
 
-        `region` (x, y, width, height) px, None for every site; `aggregate` "inverse_variance" weighs by the
-        covariance, "median" does without. The standard deviation allows for the correlation of neighbouring
-        estimates, and for an error that they have in common: what they claim and do not scatter. A single
-        field only. ValueError for unknown names and for "inverse_variance" without covariance.
+        `region` None for every site, a rectangle (x, y, width, height), a disc (x, y, radius), a polygon of
+        corners (N, 2), px, or a boolean mask (H, W); `aggregate` "inverse_variance" (default) weighs by the
+        covariance, "median" does without. The mean motion stands at the
+        centre of the sites; derived quantities are its own: ratios, lengths and angles are
+        formed after the mean is, and what noise adds to a length is taken off. The standard deviation allows
+        for the correlation of neighbouring estimates, and for an error that they have in common: what they
+        claim and do not scatter. A single field only; `measure` fits one motion instead, and takes stacks.
+        ValueError for unknown names, regions that do not fit the frame, and for "inverse_variance" without
+        covariance.
         """
     def measure(
-        self, /, name: str, region: ArrayLike | None = None, *, seed: tuple[float, float] | None = None
+        self, /, name: str, region: ArrayLike | None = None, *, at: tuple[float, float] | None = None
     ) -> Measurement:
-        """The"""
+        """The parameter or derived quantity `name` of the one affine motion that a region follows, as
+        `Measurement`; for a stack at each time.
+
+        `region` as in `region_mean`. The motion is that of more than half of the valid sites, else the status
+        is "no_dominant_motion" and the value NaN; with `at`, a pixel (x, y), that of the sites around it,
+        however few they are. u and v are those at the region's centre. A site follows the motion where its
+        flow differs by no more than its standard deviation and .1 px/frame explain at 99 %: motions that
+        differ by less are not told apart, and `std` does not hold that. ValueError for
+        unknown names, a region or pixel outside the frame, and for a field without covariance.
+
+        >>> import jacoflow
+        >>> scene = jacoflow.scenes.Scene("affine", width=96, height=64, u_x=0.01, v_y=0.01)
+        >>> field = jacoflow.flow(*scene.frames(2))
+        >>> found = field.measure("time_to_contact", region=(20, 16, 56, 32))
+        >>> round(found.value), found.unit, found.status
+        (100, 'frame', 'ok')
+        """
     @overload
     def advect(self, /, points: ArrayLike, covariance: None = None) -> NDArray[np.float64]:
         """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its
-        fields, (T + 1, N, 2), beginning with `points`.
+        fields, (T + 1, N, 2), beginning with `points`. Fields at the end without a next frame are left out:
+        those of T frames give where the points are at each of them, (T, N, 2).
 
         `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites
         the flow is bilinear in what the four sites about a point say of it by flow and Jacobian: affine
@@ -292,13 +320,13 @@ class FlowField:
         the point's and from field to field, and as alike at neighbouring sites. Zeros begin with certain
         points.
 
-        A grid in px only: ValueError for a list of points, for another `pixel_pitch` than 1, for other
-        shapes, and for matrices that are no covariance.
+        ValueError for a field of points, for other shapes, and for matrices that are no covariance.
         """
     @overload
     def advect(self, /, points: ArrayLike, covariance: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its
-        fields, (T + 1, N, 2), beginning with `points`.
+        fields, (T + 1, N, 2), beginning with `points`. Fields at the end without a next frame are left out:
+        those of T frames give where the points are at each of them, (T, N, 2).
 
         `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites
         the flow is bilinear in what the four sites about a point say of it by flow and Jacobian: affine
@@ -310,12 +338,11 @@ class FlowField:
         the point's and from field to field, and as alike at neighbouring sites. Zeros begin with certain
         points.
 
-        A grid in px only: ValueError for a list of points, for another `pixel_pitch` than 1, for other
-        shapes, and for matrices that are no covariance.
+        ValueError for a field of points, for other shapes, and for matrices that are no covariance.
         """
     def unit(self, /, name: str) -> str:
-        """Unit of the parameter or derived quantity `name` for a pixel pitch of 1 px. ValueError for another
-        name."""
+        """Unit of the parameter or derived quantity `name`: lengths in px or `length_unit`, times in frames, or
+        in seconds with a frame period. ValueError for another name."""
     @property
     def points(self) -> NDArray[np.int64]:
         """Pixel (x, y) of each site, int64 array (H, W, 2), for a list of points (N, 2)."""
@@ -333,10 +360,11 @@ class FlowField:
         """Physical size (dx, dy) of a pixel, 1 px or any length unit."""
     @property
     def length_unit(self) -> str:
-        """Name"""
+        """Name of the unit of lengths, "px" unless there is a pixel pitch."""
     @property
     def interval(self) -> Literal["forward", "central", "instant"]:
-        """What"""
+        """What the flow at frame t is: "forward", the step to frame t + 1; "central", the mean of the steps
+        before and after; "instant", the velocity at frame t (no unit)."""
     @property
     def correlation_length(self) -> float:
         """How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0
@@ -381,40 +409,40 @@ class FlowField:
 
 @final
 class Measurement:
-    """A"""
+    """A quantity of a region, in each field of a stack: numbers for a single field, arrays (T,) for a stack."""
     @property
     def quantity(self) -> str:
-        """N"""
+        """Name of the quantity (no unit)."""
     @property
     def unit(self) -> str:
-        """U"""
+        """Unit of `value` and `std`."""
     @property
     def value(self) -> Any:
-        """V"""
+        """The value, float or float64 array (T,), in `unit`; NaN unless the status is "ok"."""
     @property
     def std(self) -> Any:
-        """V"""
+        """Its standard deviation, float or float64 array (T,), in `unit`."""
     @property
     def share(self) -> Any:
-        """V"""
+        """Share of the region's valid sites that follow the motion, float or float64 array (T,), 0 to 1."""
     @property
     def valid_share(self) -> Any:
-        """V"""
+        """Share of the region's sites that are valid, float or float64 array (T,), 0 to 1."""
     @property
     def count(self) -> Any:
-        """V"""
+        """Sites that the motion was fitted to, int or int64 array (T,)."""
     @property
     def status(self) -> Any:
-        """V"""
+        """"ok", "no_dominant_motion" or "too_few_sites" (no unit), str or list (T,) of them."""
     @property
     def motion(self) -> NDArray[np.float64]:
-        """V"""
+        """The motion (u, v, u_x, v_x, u_y, v_y) at `centre`, float64 array (6,) or (T, 6), in the field's units."""
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """V"""
+        """Its covariance, float64 array (6, 6) or (T, 6, 6), in squares of the field's units."""
     @property
     def centre(self) -> NDArray[np.float64]:
-        """V"""
+        """Centre (x, y) of the region's sites, float64 array (2,) or (T, 2), px."""
 def estimate(
     frames: _Frames,
     *more: Any,
@@ -437,12 +465,16 @@ def estimate(
     simd: _Simd | None = None,
     progress: _Progress | None = None,
 ) -> FlowField:
-    """Flow, its Jacobian and their covariance, from two or three frames or from a stack.
+    """Flow, its Jacobian and their covariance at every frame of a sequence.
 
-    A list or tuple of three frames (H, W) gives one FlowField (H, W), one of two frames as well
-    (every method but "instantaneous"); a longer list gives a stack (T - 2, H, W), and so does an
-    array (T, H, W) of any length. Frames are uint8, uint16, float32 or float64 in any grey scale: the
-    intensity gain does not change the flow. float64 is computed in float64, everything else in
+    T frames give a FlowField of T fields, (T, H, W), in any container: field t belongs to frame
+    t. Frames at the ends that lack a neighbour have NaN and the status MISSING_FRAME: with the
+    default method, which gives the step to the next frame, the last; the first step is estimated
+    from its two frames. Two frames are estimated as a pair (every method but "instantaneous").
+    For one field from two or three frames see `flow`. Frames are uint8, uint16, float32 or float64 in
+    any grey scale: the intensity gain does not change the flow. Other types are converted where that
+    is exact: bool to uint8, int8, int16 and float16 to float32, wider integers up to 2^53 to float64.
+    Pixels that a masked array hides are not used. float64 is computed in float64, everything else in
     float32. Inputs are never modified.
 
     Parameters
@@ -450,6 +482,11 @@ def estimate(
     frames : array (T, H, W), or list, tuple or iterator of arrays (H, W)
         Oldest first, one size, at least 3 x 3 px (`coarse_to_fine` finds nothing in frames less than
         5 px wide or high).
+    ends : "nan" (default) or "drop"
+        "drop" leaves out the frames at the ends that lack a neighbour: two frames give one field,
+        three or more (T - 2, H, W), or (T - 1, H, W) with the time scheme "pair".
+    pairs : bool
+        Frames of double-frame recordings, 0 and 1, 2 and 3, ...: T / 2 fields, none between pairs.
     method : "coarse_to_fine", "windowed", "instantaneous", "lucas_kanade", "horn_schunck", or options
         A name means the method with its defaults; `CoarseToFine` (default), `Windowed`,
         `Instantaneous`, `LucasKanade` and `HornSchunck` hold its options and say what it is for.
@@ -475,9 +512,11 @@ def estimate(
     preprocess : `Preprocess`
         Quantising, smoothing and conversion of colour, before anything else.
     fps : float, frames/s
-        For quantities per second.
-    pixel_pitch : float or (dx, dy), any length unit
-        Size of a pixel; flow then comes in that unit per frame.
+        Times are then in seconds: flow in px/s, the Jacobian in 1/s.
+    pixel_pitch : float or (dx, dy), in `length_unit`
+        Size of a pixel; lengths are then in that unit.
+    length_unit : str
+        Its name, "mm" for example; default "length".
     precision : "float32" or "float64"
         Default: that of the frames.
     threads : int
@@ -487,7 +526,7 @@ def estimate(
         Default: environment variable JACOFLOW_SIMD, else the best of the processor.
     progress : None, True or function (done, total)
         True draws a line on standard error; a function is called after each frame. Ctrl-C stops
-        between frames.
+        also amid a frame.
 
     Raises
     ------
@@ -519,7 +558,24 @@ def flow(
     threads: int | None = None,
     simd: _Simd | None = None,
 ) -> FlowField:
-    """One"""
+    """One field, flow with its Jacobian and covariance, from two or three frames.
+
+    Two frames give the step from the first to the second, at the pixels of the first (every method
+    but "instantaneous"). Three give that from the second to the third, at the pixels of the second;
+    the first helps where motion is steady.
+
+    Parameters
+    ----------
+    first, second, third : arrays (H, W)
+        Frames, oldest first, as in `estimate`.
+
+    The options, their units and the errors are those of `estimate`.
+
+    >>> import jacoflow
+    >>> a, b = jacoflow.scenes.Scene("affine", width=96, height=64).frames(2)
+    >>> jacoflow.flow(a, b).shape
+    (64, 96)
+    """
 @final
 class FlowEstimator:
     """Flow from a stream: frames are pushed one by one, memory stays bounded.
@@ -551,7 +607,11 @@ class FlowEstimator:
         """Takes the next frame (H, W), in any grey unit; returns a FlowField (px/frame) once enough frames have
         come, before that None.
 
-        A frame that raises an error (ValueError for another size, TypeError for another dtype) is not kept.
+        `time`, s, is when the frame was taken, for every frame or none: fields are then per second, each by
+        the time between its own frames, and not `fps`. Where a frame is missing, "coarse_to_fine"
+        estimates the step to the next one from two frames. A frame that raises an error (ValueError for
+        another size or a time not after the last, TypeError for another dtype) is not kept. Ctrl-C stops the
+        work and forgets every frame.
         """
     def reset(self, /) -> None:
         """Forgets every frame (H, W); the next one begins a new sequence, frame index 0."""
@@ -729,6 +789,10 @@ class GaussianFilter:
     changed in place; a number given for P, Q or R means that multiple of the identity. ValueError for an x
     that is not finite and for a P, Q or R that is not finite, symmetric and positive semi-definite, when it
     is set or, changed in place, at the next step. Units are the state's and the measurement's own.
+
+    A state that cannot make a step is left as it was and marked in `failed`; an error is raised only when all
+    are. For angles and other quantities that are no vectors, `residual_x`, `residual_z` and `state_add`
+    replace differences and sums; None means those of vectors. Like all functions they are vectorised.
     """
     @property
     def x(self) -> NDArray[np.float64]:
@@ -752,8 +816,8 @@ class GaussianFilter:
     def R(self, value: ArrayLike, /) -> None: ...
     @property
     def y(self) -> NDArray[np.float64]:
-        """Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where the
-        measurement was missing."""
+        """Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where a component
+        was missing, as in S and K."""
     @property
     def S(self) -> NDArray[np.float64]:
         """Covariance of the residual, array (m, m) or (B, m, m), in the measurement's units squared."""
@@ -762,7 +826,16 @@ class GaussianFilter:
         """Gain of the last update, array (n, m) or (B, n, m), state units per measurement unit."""
     @property
     def log_likelihood(self) -> NDArray[np.float64]:
-        """Logarithm of the last measurement's likelihood, array () or (B,), no unit."""
+        """Logarithm of the likelihood of the last measurement's components that were there, array () or (B,), no
+        unit; zero without any."""
+    @property
+    def mahalanobis(self) -> NDArray[np.float64]:
+        """Mahalanobis distance sqrt(y^T S^-1 y) of the last measurement, array () or (B,), in standard
+        deviations; zero where it was missing."""
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Whether a step could not be carried out for a state, since P was last assigned: bool array () or
+        (B,), no unit. The state was left as it was before that step."""
     @property
     def repairs(self) -> int:
         """How often a covariance had lost its positive definiteness and was repaired (a count, no unit)."""
@@ -775,15 +848,43 @@ class GaussianFilter:
     @property
     def batch(self) -> int | None:
         """Number B of independent filters, or None where arrays have no leading axis (a count, no unit)."""
+    @property
+    def residual_x(self) -> _Function | None:
+        """Difference `residual_x(a, b)` of states, arrays (..., n) of one shape -> (..., n), in the state's
+        units; None: a - b."""
+    @residual_x.setter
+    def residual_x(self, value: _Function | None, /) -> None: ...
+    @property
+    def residual_z(self) -> _Function | None:
+        """Difference `residual_z(a, b)` of measurements, arrays (..., m) of one shape -> (..., m), in the
+        measurement's units; None: a - b."""
+    @residual_z.setter
+    def residual_z(self, value: _Function | None, /) -> None: ...
+    @property
+    def state_add(self) -> _Function | None:
+        """Sum `state_add(x, dx)` of a state and a difference, arrays (n,) or (B, n) -> the same shape, in the
+        state's units; None: x + dx."""
+    @state_add.setter
+    def state_add(self, value: _Function | None, /) -> None: ...
 
 @final
 class KalmanFilter(GaussianFilter):
     """Linear Kalman filter x' = F x + w, z = H x + v with w ~ N(0, Q), v ~ N(0, R).
 
     `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a
-    leading axis (B, ...).
+    leading axis (B, ...). Of the functions `residual_z` and `state_add` are used, `residual_x` by the
+    smoother.
     """
-    def __new__(cls, dim_x: int, dim_z: int, *, batch: int | None = None) -> KalmanFilter: ...
+    def __new__(
+        cls,
+        dim_x: int,
+        dim_z: int,
+        *,
+        batch: int | None = None,
+        residual_x: _Function | None = None,
+        residual_z: _Function | None = None,
+        state_add: _Function | None = None,
+    ) -> KalmanFilter: ...
     @property
     def F(self) -> NDArray[np.float64]:
         """Transition matrix, array (n, n) or (B, n, n), in the state's units; identity at first."""
@@ -797,11 +898,39 @@ class KalmanFilter(GaussianFilter):
     def predict(self, /, *, F: ArrayLike | None = None, Q: ArrayLike | None = None) -> None:
         """x <- F x, P <- F P F^T + Q. `F` (n, n) or (B, n, n) and `Q` replace the attributes for this step."""
     def update(self, /, z: ArrayLike | None, R: ArrayLike | None = None, H: ArrayLike | None = None) -> None:
-        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
-        one.
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are
+        neither NaN nor masked. None means that all are missing.
 
-        `R` and `H` replace the attributes for this step. NumericalError when the innovation covariance is not
-        positive definite.
+        `R` and `H` replace the attributes for this step. NumericalError when no state has a positive definite
+        innovation covariance. Exceptions of the functions leave x and P as they were.
+        """
+    def batch_filter(
+        self,
+        /,
+        zs: _Items,
+        Fs: _Items | None = None,
+        Qs: _Items | None = None,
+        Hs: _Items | None = None,
+        Rs: _Items | None = None,
+        *,
+        update_first: bool = False,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Filters the measurements `zs` of T times, each as `update` takes it, from the present state on.
+
+        Returns means (T, n), covariances (T, n, n) after the updates and those after the predictions, in the
+        state's units, with the batch's axis after T. `Fs`, `Qs`, `Hs`, `Rs`, sequences of T items, replace
+        the attributes where an item is not None. With `update_first` each time is updated, then predicted.
+        ValueError naming the sequence for a wrong number of items or shape.
+        """
+    def rts_smoother(
+        self, /, Xs: ArrayLike, Ps: ArrayLike, Fs: _Items | None = None, Qs: _Items | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units,
+        with the batch's axis after T (Rauch, Tung, Striebel 1965).
+
+        Returns smoothed means (T, n), covariances, gains and predicted covariances (T, n, n). Gain and
+        prediction k are of the step from time k to k + 1; `Fs` and `Qs`, sequences of T items as in
+        `batch_filter`, are of the step to their time. NaN where a state cannot be smoothed.
         """
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
@@ -812,9 +941,19 @@ class ExtendedKalmanFilter(GaussianFilter):
     `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a
     leading axis (B, ...). Functions are vectorised over leading axes: `fx` and `Hx` map (..., n) to (..., n)
     and (..., m); `FJacobian` and `HJacobian` map the means (n,) or (B, n) to (n, n) or (B, n, n) and (m, n)
-    or (B, m, n). Without a Jacobian central differences are taken.
+    or (B, m, n). Without a Jacobian central differences are taken. `residual_z` and `state_add` serve the
+    update, `residual_x` and `residual_z` the central differences, `residual_x` the smoother.
     """
-    def __new__(cls, dim_x: int, dim_z: int, *, batch: int | None = None) -> ExtendedKalmanFilter: ...
+    def __new__(
+        cls,
+        dim_x: int,
+        dim_z: int,
+        *,
+        batch: int | None = None,
+        residual_x: _Function | None = None,
+        residual_z: _Function | None = None,
+        state_add: _Function | None = None,
+    ) -> ExtendedKalmanFilter: ...
     def predict(self, /, fx: _Callback, FJacobian: _Callback | None = None) -> None:
         """x <- fx(x), P <- F P F^T + Q with F = `FJacobian(x)`, arrays (n,) and (n, n) or with a leading (B,
         ...), in the state's units.
@@ -824,11 +963,44 @@ class ExtendedKalmanFilter(GaussianFilter):
     def update(
         self, /, z: ArrayLike | None, HJacobian: _Callback | None, Hx: _Callback, R: ArrayLike | None = None
     ) -> None:
-        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
-        one.
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are
+        neither NaN nor masked. None means that all are missing.
 
         `HJacobian` None takes central differences of `Hx`. `R` replaces the attribute for this step.
         Exceptions of the functions leave x and P as they were.
+        """
+    def batch_filter(
+        self,
+        /,
+        zs: _Items,
+        fx: _Callback,
+        HJacobian: _Callback | None,
+        Hx: _Callback,
+        FJacobian: _Callback | None = None,
+        *,
+        Rs: _Items | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Filters the measurements `zs` of T times, each as `update` takes it, from the present state on;
+        functions as in `predict` and `update`.
+
+        Returns means (T, n) and covariances (T, n, n), in the state's units, with the batch's axis after T.
+        `Rs`, a sequence of T items, replaces R where an item is not None.
+        """
+    def rts_smoother(
+        self,
+        /,
+        Xs: ArrayLike,
+        Ps: ArrayLike,
+        fx: _Callback,
+        FJacobian: _Callback | None = None,
+        *,
+        Qs: _Items | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units,
+        with the batch's axis after T; functions as in `predict`.
+
+        Returns smoothed means (T, n), covariances and gains (T, n, n); gain k is from time k + 1 to k.
+        `Qs`, a sequence of T items, are of the step to their time. NaN where a state cannot be smoothed.
         """
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
@@ -1038,6 +1210,9 @@ class UnscentedKalmanFilter(GaussianFilter):
     part of the sigma points, `fx(points, noise, dt)` with 4 n + 1 rows each. With `redraw=True` new points
     are drawn for the measurement; False measures the propagated ones, as filterpy 1 did, which leaves Q out
     of the innovation covariance.
+
+    For angles: differences `residual_x(a, b)`, `residual_z(a, b)`, weighted means `x_mean(points, weights)`,
+    `z_mean(points, weights)` and the sum `state_add(x, dx)`; see the attributes.
     """
     def __new__(
         cls,
@@ -1048,6 +1223,11 @@ class UnscentedKalmanFilter(GaussianFilter):
         fx: _Callback,
         points: MerweScaledSigmaPoints,
         *,
+        x_mean: _Function | None = None,
+        z_mean: _Function | None = None,
+        residual_x: _Function | None = None,
+        residual_z: _Function | None = None,
+        state_add: _Function | None = None,
         batch: int | None = None,
         augmented: bool = False,
         redraw: bool = True,
@@ -1074,21 +1254,53 @@ class UnscentedKalmanFilter(GaussianFilter):
     @property
     def redraw(self) -> bool:
         """Whether new points are drawn for the measurement (no unit)."""
+    @property
+    def x_mean(self) -> _Function | None:
+        """Weighted mean `x_mean(points, weights)` of states, arrays (2 n + 1, n) or (B, 2 n + 1, n) and (2 n
+        + 1,) -> (n,) or (B, n), in the state's units; weights sum to 1 and may be negative. None: the
+        arithmetic mean."""
+    @x_mean.setter
+    def x_mean(self, value: _Function | None, /) -> None: ...
+    @property
+    def z_mean(self) -> _Function | None:
+        """As `x_mean`, of measurements: (..., 2 n + 1, m) -> (..., m), in the measurement's units."""
+    @z_mean.setter
+    def z_mean(self, value: _Function | None, /) -> None: ...
     def predict(self, /, dt: float | None = None, fx: _Callback | None = None, **fx_args: Any) -> None:
         """Propagates mean and covariance through `fx` by `dt` (default: that of the constructor, same unit);
         keywords are handed to `fx`.
 
-        Exceptions of `fx` leave x and P (n,), (n, n) as they were. NumericalError when P has no
-        positive-definite repair.
+        Exceptions of the functions leave x and P (n,), (n, n) as they were. NumericalError when every state
+        outgrows the range of numbers.
         """
     def update(
         self, /, z: ArrayLike | None, R: ArrayLike | None = None, hx: _Callback | None = None, **hx_args: Any
     ) -> None:
-        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
-        one.
+        """Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are
+        neither NaN nor masked. None means that all are missing.
 
-        `R` and `hx` replace the attributes for this step, keywords are handed to `hx`. Exceptions of `hx`
-        leave x and P as they were.
+        `R` and `hx` replace the attributes for this step, keywords are handed to `hx`. Exceptions of the
+        functions leave x and P as they were.
+        """
+    def batch_filter(
+        self, /, zs: _Items, Rs: _Items | None = None, dts: float | _Items | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Filters the measurements `zs` of T times, each as `update` takes it, from the present state on.
+
+        Returns means (T, n) and covariances (T, n, n), in the state's units, with the batch's axis after T.
+        `Rs`, a sequence of T items, replaces R where an item is not None; `dts`, a number or a sequence,
+        is the step to each time.
+        """
+    def rts_smoother(
+        self, /, Xs: ArrayLike, Ps: ArrayLike, Qs: _Items | None = None, dts: float | _Items | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units,
+        with the batch's axis after T (Sarkka 2008).
+
+        Returns smoothed means (T, n), covariances and gains (T, n, n); gain k is from time k + 1 to k.
+        `Qs`, a sequence of T items, and `dts`, a number or a sequence, are of the step to their time, as
+        in `batch_filter` (filterpy takes dts[k] for the step from k). NaN where a state cannot be
+        smoothed.
         """
     def __reduce__(self, /) -> tuple[Any, ...]: ...
 
@@ -1240,17 +1452,23 @@ class Sensor:
     def __getnewargs_ex__(self, /) -> tuple[tuple[()], dict[str, Any]]: ...
 
 @final
-class FrameReader:
-    """Reads frames (H, W), or (H, W, 3) with colour="rgb", one by one from the source of
-    `jacoflow.io.frames`; memory stays bounded. Samples keep the file's dtype and grey levels.
-    """
-    def __iter__(self, /) -> FrameReader: ...
+class _FrameSource:
+    """Frames (H, W), or (H, W, 3) with colour="rgb", one by one; what `jacoflow.io.FrameReader` wraps."""
+    def __iter__(self, /) -> _FrameSource: ...
     def __next__(self, /) -> NDArray[Any]: ...
     def __length_hint__(self, /) -> int: ...
     @property
     def frame_rate(self) -> float | None:
         """Frames per second, where the source says so, else None."""
-    def __reduce__(self, /) -> tuple[Any, ...]: ...
+    @property
+    def time(self) -> float | None:
+        """Time of the frame read last, s, where the source says so, else None."""
+    @property
+    def pixel_pitch(self) -> tuple[float, float] | None:
+        """Width and height of a pixel in `length_unit`, where the source says so, else None."""
+    @property
+    def length_unit(self) -> str | None:
+        """Unit of `pixel_pitch` as the source spells it, else None."""
 
 @final
 class _GradientTracker:
@@ -1266,6 +1484,7 @@ class _GradientTracker:
         """The target in the next frame, as a dictionary."""
     def state(self) -> dict[str, Any]:
         """The target at the last frame, as a dictionary."""
+    def __reduce__(self, /) -> tuple[Any, tuple[bytes, float]]: ...
 
 @final
 class _GaussMarkovFilter:
@@ -1331,6 +1550,7 @@ class _StereoTracker:
         """Clusters of all steps so far and their arcs."""
     def tracks(self) -> dict[int, tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]]:
         """Tracks by id: times (T,), positions (T, 3), velocities (T, 3) and when that was (T,)."""
+    def __reduce__(self, /) -> tuple[Any, tuple[bytes, float | None]]: ...
 
 @final
 class _TrackGraph:
@@ -1418,19 +1638,31 @@ def _edge_pixels(
     view: ArrayLike, blur_sigma: float, threshold: float, threads: int | None
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
 def _estimate_row_offset(left: ArrayLike, right: ArrayLike, options: dict[str, Any]) -> tuple[float, bool]: ...
-def _open_frames(
+def _kind_of(
     spec: _Path,
-    colour: Literal["error", "luminance", "rgb"] | None,
-    grey: Literal["error", "repeat"] | None,
+    colour: str | None,
+    grey: str | None,
+    channel: int | None,
+    z: int | str | None,
     start: int,
     stop: int | None,
     step: int,
-) -> FrameReader: ...
+) -> str | None: ...
+def _open_frames(
+    spec: _Path,
+    colour: str | None,
+    grey: str | None,
+    channel: int | None,
+    z: int | str | None,
+    start: int,
+    stop: int | None,
+    step: int,
+) -> _FrameSource: ...
 def _read_disparity(path: _Path) -> NDArray[np.float32]: ...
 def _write_disparity(path: _Path, disparity: ArrayLike) -> int: ...
 def _read_flow(path: _Path, format: Literal["flo", "kitti"]) -> NDArray[np.float32]: ...
 def _read_image(
-    path: _Path, colour: Literal["error", "luminance", "rgb"] | None, grey: Literal["error", "repeat"] | None
+    path: _Path, colour: str | None, grey: str | None, channel: int | None, z: int | str | None
 ) -> NDArray[Any]: ...
 def _read_pfm(path: _Path) -> NDArray[np.float32]: ...
 def _write_flow(path: _Path, flow: ArrayLike, format: Literal["flo", "kitti"]) -> None: ...
@@ -1448,6 +1680,10 @@ def _scene_carriers() -> dict[str, str]: ...
 def _scene_names() -> dict[str, str]: ...
 def _scene_parameters(name: str) -> dict[str, tuple[float | None, str]]: ...
 def _target_scene_names() -> dict[str, str]: ...
+def _restore_gradient_tracker(state: bytes, gain: float) -> _GradientTracker:
+    """The inverse of `_GradientTracker.__reduce__`."""
+def _restore_stereo_tracker(state: bytes, gain: float | None) -> _StereoTracker:
+    """The inverse of `_StereoTracker.__reduce__`."""
 def _restore_particle_step(state: bytes) -> _ParticleStep:
     """The inverse of `_ParticleStep.__reduce__`."""
 def _restore_particle_tracker(state: bytes, takes_grey: bool) -> _ParticleTracker:

@@ -188,6 +188,8 @@ def _reals(name: str, values: ArrayLike) -> Array:
         raise ValueError(f"{name}: Complex data not supported, got {array.dtype}.")
     try:
         return np.ascontiguousarray(array, dtype=np.float64)
+    except OverflowError as error:
+        raise ValueError(f"{name}: expected numbers of double precision, got {error}") from error
     except (TypeError, ValueError) as error:
         raise type(error)(f"{name}: expected real numbers, got {array.dtype}: {error}") from error
 

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._brief import Brief
 from ._jacoflow import _classify, _observability
 from ._options import Preprocess
 
@@ -47,8 +48,8 @@ class Observability:
     """Condition number of the column-scaled equations."""
 
 
-@dataclass(frozen=True, eq=False)
-class ObservabilityMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class ObservabilityMap(Brief):
     """What theorem 1 says of every pixel: arrays (H, W) without units."""
 
     condition: NDArray[np.uint8]

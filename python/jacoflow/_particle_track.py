@@ -10,15 +10,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._brief import Rows
 from ._jacoflow import _ParticleStep, _ParticleTracker
 from ._particle_options import checked, checked_box, checked_boxes, checked_camera, checked_id
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class ParticleCorners:
+@dataclass(frozen=True, eq=False, repr=False)
+class ParticleCorners(Rows):
     """The N corners that were followed from the frame before; lengths in px."""
+
+    _ROWS = ("ids", "positions", "residuals", "p", "owner")
 
     ids: NDArray[np.int64]
     """Their numbers, (N,), no unit: a corner keeps its number as long as it is followed."""
@@ -35,14 +38,16 @@ class ParticleCorners:
         return len(self.ids)
 
 
-@dataclass(frozen=True, eq=False)
-class ParticleStep:
+@dataclass(frozen=True, eq=False, repr=False)
+class ParticleStep(Rows):
     """The K targets at one frame, in ascending order of their ids. Lengths in px, times in frames.
 
     It stays what it is when the tracker goes on, and pickles. For that it holds the particles (56 bytes each)
     and shares with the tracker one copy of the frame, from which `foreground` and `segments` are made when
     they are first used; `without` drops them.
     """
+
+    _ROWS = ("ids", "boxes", "position", "velocity", "size", "covariance", "effective_sample_size", "similarity", "n_tracks", "degenerate", "status", "reason")
 
     frame: int
     """Index of the frame, 0 for the one that the tracker began with (no unit)."""

@@ -11,6 +11,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._brief import Brief, Rows
 from ._jacoflow import _write_particle_tracks
 from ._particle_options import checked_box, checked_boxes, checked_id
 from ._particle_track import Array, ParticleStep, ParticleTracker
@@ -20,10 +21,12 @@ Progress = Callable[[int, int], object] | bool | None
 Starts = dict[int, list[tuple[int, list[float]]]]
 
 
-@dataclass(frozen=True, eq=False)
-class ParticleTrack:
+@dataclass(frozen=True, eq=False, repr=False)
+class ParticleTrack(Rows):
     """One target through all T frames, in px; NaN (or "", -1, False) in frames in which it is not followed.
     """
+
+    _ROWS = ("present", "boxes", "position", "velocity", "size", "covariance", "effective_sample_size", "similarity", "n_tracks", "degenerate", "status", "reason")
 
     id: int
     """Its number (no unit)."""
@@ -56,8 +59,8 @@ class ParticleTrack:
         return len(self.present)
 
 
-@dataclass(frozen=True, eq=False)
-class ParticleTracks:
+@dataclass(frozen=True, eq=False, repr=False)
+class ParticleTracks(Brief):
     """The steps of a sequence of T frames, a list of them that cannot be changed; lengths in px. It pickles.
     """
 

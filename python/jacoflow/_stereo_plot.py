@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._figures import axes_or_new, colour_map, frame_extent
+from ._figures import axes_or_new, check_parts, colour_map, frame_extent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,6 +31,9 @@ def identity_colours(numbers: ArrayLike) -> NDArray[np.float64]:
 
 def disparity(found: EdgeDisparity, *, left: ArrayLike | None = None, axes: Axes | None = None, limits: tuple[float, float] | None = None) -> Axes:
     """Draws the N edge pixels of an `EdgeDisparity` coloured by disparity, px, over `left`, a grey array (H, W), if given; `limits` (least, greatest), px, of the colours."""
+    check_parts("found", found, "EdgeDisparity", ("disparity", "rows", "cols", "values"))
+    if limits is not None and np.shape(limits) != (2,):
+        raise ValueError(f"limits: expected two numbers, least and greatest, got {limits!r}")
     axes = axes_or_new(axes)
     _background(axes, left, found.disparity.shape)
     if limits is None:
@@ -47,6 +50,7 @@ def clusters(step: StereoStep, *, left: ArrayLike | None = None, axes: Axes | No
 
     Arrows are `arrows` times the motion since the last step, px; 0 draws none.
     """
+    check_parts("step", step, "StereoStep", ("rows", "cols", "clusters", "cluster_of_pixel"))
     if by not in ("track", "group"):
         raise ValueError(f'by: expected "track" or "group", got {by!r}')
     axes = axes_or_new(axes)
@@ -68,6 +72,7 @@ def clusters(step: StereoStep, *, left: ArrayLike | None = None, axes: Axes | No
 def track_graph(graph: TrackGraph, *, axes: Axes | None = None, threshold: float = 0.4) -> Axes:
     """Draws a `TrackGraph` over time: steps to the right, a row for each component (no unit); nodes in the colour of their track, as large as their number of pixels; arcs with a score of
     at least `threshold` (0 to 2), as thick as their score."""
+    check_parts("graph", graph, "TrackGraph", ("nodes", "arcs"))
     axes = axes_or_new(axes)
     nodes = graph.nodes
     for ((t0, k0), (t1, k1)), (forward, backward) in graph.arcs.items():

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._brief import Brief, Rows
 from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
 from ._stereo_options import StereoCamera, as_array, checked, checked_views, real_number, warn_of_rows, whole_number
 
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class StereoCluster:
+@dataclass(frozen=True, eq=False, repr=False)
+class StereoCluster(Brief):
     """A cluster of edge pixels at one step. Lengths in px of the left view, depths as disparity (px), times in steps (velocities, per step: for the unit of the tracker's `step_time`, which by default is one); NaN where nothing was measured."""
 
     time: int
@@ -58,9 +59,11 @@ class StereoCluster:
     """Velocity (X, Y, Z) since the last step, (3,), in units of the baseline's per step; NaN unless the cameras are known."""
 
 
-@dataclass(frozen=True, eq=False)
-class StereoStep:
+@dataclass(frozen=True, eq=False, repr=False)
+class StereoStep(Rows):
     """All clusters of a step, and the N edge pixels of the left view that they are made of; lengths in px."""
+
+    _ROWS = ("rows", "cols", "values", "cluster_of_pixel")
 
     time: int
     """Step, from 0 (no unit)."""
@@ -86,9 +89,11 @@ class StereoStep:
     """Rounds of the mixture, no unit."""
 
 
-@dataclass(frozen=True, eq=False)
-class StereoTrack:
+@dataclass(frozen=True, eq=False, repr=False)
+class StereoTrack(Rows):
     """One object's way through T steps, in px."""
+
+    _ROWS = ("times", "positions", "velocities", "clock")
 
     times: NDArray[np.int64]
     """Steps at which it was seen, (T,), ascending, no unit."""
@@ -170,6 +175,9 @@ class TrackGraph:
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __repr__(self) -> str:
+        return f"TrackGraph({len(self._graph.nodes())} clusters, {len(self._graph.arcs())} arcs)"
+
     def __reduce__(self) -> tuple[Any, ...]:
         return TrackGraph.from_json, (self.to_json(),)
 
@@ -195,7 +203,7 @@ class StereoTracker:
 
     Source: the stereo paper ("tracking of moving objects in stereo sequences by fusing disparity and luminance", with a variational mixture of Gaussians). Edge pixels with a disparity are counted in voxels of (x, y, disparity), clustered by
     a mixture weighted with the counts, and followed to the next step in the picture and in depth; overlaps of the clusters in both directions of time are arcs of a graph. It is deterministic for any number of threads.
-    It holds the last views smoothed and cannot be pickled; its steps, its graph and its tracks can.
+    It pickles, also in mid-stream.
 
     Parameters
     ----------
@@ -315,9 +323,6 @@ class StereoTracker:
     def tracks(self) -> dict[int, StereoTrack]:
         """Tracks by id; lengths in px."""
         return {track: StereoTrack(*parts) for track, parts in self._tracker.tracks().items()}
-
-    def __reduce__(self) -> NoReturn:
-        raise TypeError("StereoTracker: expected its graph, its tracks or its steps to be kept, got a tracker to pickle; it holds the last views smoothed at several levels")
 
 
 def _waited(dt: float | None) -> float | None:

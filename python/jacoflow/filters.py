@@ -16,6 +16,18 @@ the state and the measurement.
 >>> f.x.shape
 (2,)
 
+A whole sequence, with a measurement missing, and what its future says about its past:
+
+>>> means, covariances, _, _ = f.batch_filter([4.0, None, 6.0])
+>>> smoothed, narrowed, _, _ = f.rts_smoother(means, covariances)
+>>> bool(narrowed[1, 0, 0] < covariances[1, 0, 0])
+True
+
+Angles have differences of their own, for every filter `residual_x`, `residual_z` and `state_add`, for sigma
+points `x_mean` and `z_mean`:
+
+>>> f.residual_z = lambda a, b: (a - b + np.pi) % (2 * np.pi) - np.pi
+
 A particle filter takes any transition and any likelihood:
 
 >>> from jacoflow.filters import ParticleFilter

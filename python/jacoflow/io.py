@@ -14,8 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ._jacoflow import (
     FlowField,
-    FrameReader,
-    _open_frames,
     _read_disparity,
     _read_flow,
     _read_image,
@@ -25,6 +23,8 @@ from ._jacoflow import (
     _write_frames,
     _write_pfm,
 )
+from ._readers import FrameReader
+from ._request import Request
 
 __all__ = [
     "FrameReader",
@@ -51,6 +51,9 @@ def frames(
     *,
     colour: Literal["error", "luminance", "rgb"] | None = None,
     grey: Literal["error", "repeat"] | None = None,
+    channel: int | None = None,
+    z: int | Literal["time"] | None = None,
+    key: str | None = None,
     start: int = 0,
     stop: int | None = None,
     step: int = 1,
@@ -60,8 +63,17 @@ def frames(
 
     `source`: a folder of PNG, TIFF, BMP, PGM, PPM and JPEG files (natural order), a pattern such as
     "frames/*.png", one image, a .txt list of images, a .y4m file, "-" (Y4M on standard input), a .npy stack
-    (T, H, W) or (T, H, W, 3), or a video file (needs ffmpeg on the PATH; see also `jacoflow.video`). Frames
-    `start`, `start + step`, ... below `stop` (indices, no unit); default all.
+    (T, H, W) or (T, H, W, 3), a .npz or HDF5 file (.h5, with h5py) with such a stack, a MATLAB file (.mat, with
+    scipy or, from version 7.3 on, h5py) with an array (H, W, T), or a video (through PyAV, else through an
+    ffmpeg on the PATH; see also `jacoflow.video`). `key`: the name of the array where a file holds several.
+    Frames `start`, `start + step`, ... below `stop` (indices, no unit); default all.
+
+    The pages of a TIFF file (also BigTIFF) are its frames, those of reduced resolution aside. Where ImageJ or
+    OME-XML name channels or slices, `channel` and `z` (indices) choose one of each, and without them the file
+    is refused with `FormatError`; `z="time"` takes the slices for frames. Each file of a folder or list must
+    hold one picture, of the chosen channel and slice. Samples of int8, int16 and float16 come as float32,
+    those of wider integers as float64 (`FormatError` beyond 2^53). Other kinds of TIFF are read through
+    tifffile where that is installed, else refused with `MissingDependencyError`.
 
     Frames are grey, arrays (H, W); colour is refused unless `colour="luminance"`. With `colour="rgb"` they
     are arrays (H, W, 3) of red, green and blue; grey is then refused with `FormatError` unless
@@ -76,13 +88,14 @@ def frames(
     4
     [(8, 10), (8, 10)]
     """
-    return _open_frames(source, colour, grey, start, stop, step)
+    return FrameReader(Request(os.fspath(source), colour, grey, channel, z, key, start, stop, step))
 
 
 def write_frames(path: _Path, frames: Iterable[NDArray[Any]], *, frame_rate: float = 25.0) -> int:
     """Writes frames (H, W), or (H, W, 3) in colour, of one size and dtype, in their levels; returns how many.
 
-    `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16).
+    `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16); those
+    that an earlier call wrote there are removed.
     `frame_rate` in frames/s is noted where the format has room for it.
     """
     return _write_frames(path, frames, frame_rate)
@@ -93,10 +106,12 @@ def read_image(
     *,
     colour: Literal["error", "luminance", "rgb"] | None = None,
     grey: Literal["error", "repeat"] | None = None,
+    channel: int | None = None,
+    z: int | None = None,
 ) -> NDArray[Any]:
     """Reads an image (PNG, TIFF, BMP, PGM, PPM, JPEG) as an array (H, W) of grey levels, or (H, W, 3) with
-    `colour="rgb"`; `colour` and `grey` as in `frames`."""
-    return _read_image(path, colour, grey)
+    `colour="rgb"`; `colour`, `grey`, `channel` and `z` as in `frames`."""
+    return _read_image(path, colour, grey, channel, z)
 
 
 def read_flo(path: _Path) -> NDArray[np.float32]:
@@ -161,4 +176,6 @@ def read_npz(path: _Path) -> FlowField:
 
 def write_npz(path: _Path, field: FlowField, *, options: str = "") -> None:
     """Writes a field (H, W) with all its planes and units, and `options` (free text on how it was made)."""
+    if not isinstance(field, FlowField):
+        raise TypeError(f"field: expected a FlowField, got {type(field).__name__}")
     field.save(path, options=options)

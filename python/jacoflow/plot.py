@@ -105,8 +105,8 @@ def quiver(
     One arrow every `step` sites (default: about 24 along the longer side); an arrow is `scale` times the flow
     long (default: the longest arrows just fit their distance). Px throughout.
     """
+    flow = _part(field, "flow")
     axes = axes_or_new(axes)
-    flow = np.asarray(field.flow, dtype=float)
     if flow.ndim not in (2, 3) or flow.shape[-1] != 2:
         raise ValueError(f"field: expected flow of shape (H, W, 2) or (N, 2), got {flow.shape}; index a stack first")
     x, y = _positions(field, flow.shape[:-1])
@@ -203,15 +203,23 @@ def _unit(field: FieldLike, name: str, default: str) -> str:
     return field.unit(name) if isinstance(field, FlowField) else default
 
 
+def _part(field: FieldLike, name: str) -> NDArray[np.float64]:
+    """An array of the field."""
+    array = getattr(field, name, None)
+    if array is None:
+        raise TypeError(f"field: expected a FlowField, or another object with `{name}`, got {type(field).__name__}")
+    return np.asarray(array, dtype=float)
+
+
 def _flow(field: FieldLike) -> NDArray[np.float64]:
-    flow = np.asarray(field.flow, dtype=float)
+    flow = _part(field, "flow")
     if flow.ndim != 3 or flow.shape[2] != 2:
         raise ValueError(f"field: expected flow of shape (H, W, 2), got {flow.shape}; index a stack first, draw points with quiver")
     return flow
 
 
 def _jacobian(field: FieldLike) -> NDArray[np.float64]:
-    jacobian = np.asarray(field.jacobian, dtype=float)
+    jacobian = _part(field, "jacobian")
     if jacobian.ndim != 4 or jacobian.shape[2:] != (2, 2):
         raise ValueError(f"field: expected a Jacobian of shape (H, W, 2, 2), got {jacobian.shape}; index a stack first")
     return jacobian

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _jacoflow
+from ._brief import Brief
 from ._jacoflow import MissingDependencyError
 from .track import Array, GradientTracker, Track, TrackResult, _follow, _frame, _numbers, _real, _whole, _word
 
@@ -28,7 +29,7 @@ def _compiled(name: str) -> Callable[..., Any]:
     return function
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ReferenceResult(TrackResult):
     """The target at one frame, and the window that was searched; lengths in px."""
 
@@ -117,8 +118,8 @@ def derivative_kernels(order: int) -> tuple[Array, Array, Array]:
     return value, along_x, along_y
 
 
-@dataclass(frozen=True, eq=False)
-class PixelFlow:
+@dataclass(frozen=True, eq=False, repr=False)
+class PixelFlow(Brief):
     """Flow of single pixels of a frame (H, W), px/frame."""
 
     flow: Array
@@ -140,8 +141,8 @@ def local_flow(
     return PixelFlow(*_compiled("_local_flow")(_frame(first), _frame(second), *sizes, *limits))
 
 
-@dataclass(frozen=True, eq=False)
-class MeanFlow:
+@dataclass(frozen=True, eq=False, repr=False)
+class MeanFlow(Brief):
     """What moves in a frame, px/frame, and where: M. Chiba and S. Ozawa, equation (11)."""
 
     velocity: Array

@@ -18,15 +18,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._brief import Rows
 from ._jacoflow import _edge_disparity, _edge_pixels, _estimate_row_offset
 from ._stereo_options import checked_matching, checked_views, warn_of_rows
 
 __all__ = ["EdgeDisparity", "edge_disparity", "edge_pixels", "estimate_row_offset"]
 
 
-@dataclass(frozen=True, eq=False)
-class EdgeDisparity:
+@dataclass(frozen=True, eq=False, repr=False)
+class EdgeDisparity(Rows):
     """Disparities of the left view's edge pixels, N of them, in px."""
+
+    _ROWS = ("rows", "cols", "values", "score")
 
     disparity: NDArray[np.float32]
     """`x_left - x_right` of every left pixel, (H, W), px; NaN where there is none."""

@@ -22,11 +22,12 @@ from __future__ import annotations
 import operator
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._brief import Brief, columns
 from ._jacoflow import _detect_moving_target, _GaussMarkovFilter, _GradientTracker
 from ._particle_track import ParticleCorners, ParticleStep, ParticleTracker
 from ._particle_tracks import ParticleTrack, ParticleTracks, track_particles
@@ -58,8 +59,8 @@ __all__ = [
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class TrackResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class TrackResult(Brief):
     """The target at one frame. Lengths in px, times in frames; NaN where nothing was measured."""
 
     position: Array
@@ -101,8 +102,8 @@ class TrackResult:
     """Index of the frame, counted from the one the tracker began with (no unit)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Track:
+@dataclass(frozen=True, eq=False, repr=False)
+class Track(Brief):
     """A target through a sequence: as `TrackResult`, each with a leading axis of T frames; frame 0 is the one
     the tracker began with. Lengths in px."""
 
@@ -115,6 +116,12 @@ class Track:
     def __iter__(self) -> Iterator[TrackResult]:
         return iter(self.results)
 
+    def table(self) -> dict[str, NDArray[Any]]:
+        """A column (T,) for each number of a frame, as for `pandas.DataFrame(track.table())`, in the units of
+        `TrackResult`; those of an array end in their indices: `box_0` to `box_3`."""
+        names = [field.name for field in fields(self.results[0])]
+        return columns({name: getattr(self, name) for name in names})
+
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name not in {field.name for field in fields(self.results[0])}:
             raise AttributeError(name)
@@ -125,8 +132,8 @@ class GradientTracker:
     """Follows one target by the gradient equation.
 
     Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method"
-    (IPSJ). It is deterministic and keeps bounded memory; several targets are several trackers. It holds what
-    it has learnt of the scene, several planes as large as the frame, and cannot be pickled; its results can.
+    (IPSJ). It is deterministic and keeps bounded memory; several targets are several trackers. It pickles, also in
+    mid-stream, with what it has learnt of the scene: several planes as large as the frame.
 
     Parameters
     ----------
@@ -181,9 +188,6 @@ class GradientTracker:
             For a frame of another size, naming `frame`.
         """
         return TrackResult(**self._tracker.update(_frame(frame)))
-
-    def __reduce__(self) -> NoReturn:
-        raise TypeError("GradientTracker: expected its results or its last box to be kept, got a tracker to pickle; it holds the whole scene")
 
     @property
     def result(self) -> TrackResult:
@@ -278,8 +282,8 @@ def _follow(kind: type[GradientTracker], frames: Iterable[ArrayLike], bbox: Arra
     return Track((tracker.result, *(tracker.update(frame) for frame in rest)))
 
 
-@dataclass(frozen=True, eq=False)
-class MovingTarget:
+@dataclass(frozen=True, eq=False, repr=False)
+class MovingTarget(Brief):
     """The first object that moves; lengths in px."""
 
     box: Array

@@ -14,10 +14,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _coded
 from ._jacoflow import FormatError, MissingDependencyError
 
 __all__ = ["Video", "frames"]
-
 
 
 def frames(
@@ -27,9 +27,10 @@ def frames(
     stop: int | None = None,
     step: int = 1,
     grey: Literal["luma", "bt601"] | None = "luma",
-) -> Iterator[NDArray[np.uint8]]:
-    """The frames of a video one by one, as grey uint8 arrays (H, W); memory stays bounded for any length, and
-    the file is closed when the loop ends or is left.
+) -> Iterator[NDArray[Any]]:
+    """The frames of a video one by one, as grey arrays (H, W), uint8 or, where the video has more than 8 bit,
+    uint16; memory stays bounded for any length, and the file is closed when the loop ends or is left. Frames
+    are turned as the file says for the display (phones).
 
     Parameters
     ----------
@@ -38,8 +39,8 @@ def frames(
     start, stop, step
         Frames `start`, `start + step`, ... before `stop`, counted from 0 in the order they are shown.
     grey
-        "luma": the video's own brightness, stretched to 0..255 (fast). "bt601": 0.299 R + 0.587 G + 0.114 B,
-        rounded. None: colour, arrays (H, W, 3) of red, green, blue.
+        "luma": the video's own brightness, stretched to 0..255 or 0..65535 (fast). "bt601": 0.299 R + 0.587 G
+        + 0.114 B, rounded. None: colour, arrays (H, W, 3) of red, green, blue.
 
     Raises
     ------
@@ -53,15 +54,15 @@ def frames(
     return _until_done(video)
 
 
-def _until_done(video: Video) -> Iterator[NDArray[np.uint8]]:
+def _until_done(video: Video) -> Iterator[NDArray[Any]]:
     with video:
         for _, image in video.timed():
             yield image
 
 
 class Video:
-    """A video file, open for reading: a context manager, and an iterable of uint8 arrays (H, W). Parameters
-    as in `frames`.
+    """A video file, open for reading: a context manager, and an iterable of arrays (H, W), uint8 or uint16.
+    Parameters as in `frames`.
 
     >>> with jacoflow.video.Video("clip.mp4") as video:  # doctest: +SKIP
     ...     print(video.frame_rate, video.size)
@@ -79,6 +80,9 @@ class Video:
         grey: Literal["luma", "bt601"] | None = "luma",
     ) -> None:
         """Opens the file and reads its header; shapes and units as in `frames`."""
+        for name, value in (("start", start), ("stop", stop), ("step", step)):
+            if not (hasattr(value, "__index__") or (name == "stop" and value is None)) or np.ndim(value):
+                raise TypeError(f"{name}: expected an integer, got {type(value).__name__}")
         if start < 0:
             raise ValueError(f"start: expected 0 or more frames, got {start}")
         if stop is not None and stop < 0:
@@ -120,7 +124,8 @@ class Video:
 
     @property
     def size(self) -> tuple[int, int]:
-        """(width, height) of a frame, px."""
+        """(width, height) of a frame as coded, px; a video that is shown turned by a quarter has frames of
+        (height, width)."""
         return self._stream.width, self._stream.height
 
     @property
@@ -129,7 +134,7 @@ class Video:
         count = self._stream.frames
         return int(count) if count else None
 
-    def timed(self) -> Iterator[tuple[float | None, NDArray[np.uint8]]]:
+    def timed(self) -> Iterator[tuple[float | None, NDArray[Any]]]:
         """The frames with their time in s since the start of the video (None where the file has none): pairs
         (time, array (H, W))."""
         stream = self._stream
@@ -138,24 +143,25 @@ class Video:
         try:
             for index, frame in enumerate(self._container.decode(stream)):
                 if index >= self._start and (index - self._start) % self._step == 0:
-                    yield frame.time, self._image(frame)
+                    yield frame.time, _coded.upright(self._image(frame), frame)
                 if self._stop is not None and index + 1 >= self._stop:
                     return
         except self._av.FFmpegError as error:
             raise FormatError(f"{self._path}: decoding stopped ({error})") from error
 
-    def _image(self, frame: Any) -> NDArray[np.uint8]:
+    def _image(self, frame: Any) -> NDArray[Any]:
+        is_deep = _coded.depth(frame) > 8
         if self._grey == "luma":
-            luma: NDArray[np.uint8] = frame.to_ndarray(format="gray")
+            luma: NDArray[Any] = frame.to_ndarray(format="gray16le" if is_deep else "gray")
             return luma
-        colour: NDArray[np.uint8] = frame.to_ndarray(format="rgb24")
+        colour: NDArray[Any] = frame.to_ndarray(format="rgb48le" if is_deep else "rgb24")
         if self._grey is None:
             return colour
         weighted = colour @ np.array([0.299, 0.587, 0.114])
-        rounded: NDArray[np.uint8] = np.rint(weighted).astype(np.uint8)
+        rounded: NDArray[Any] = np.rint(weighted).astype(colour.dtype)
         return rounded
 
-    def __iter__(self) -> Iterator[NDArray[np.uint8]]:
+    def __iter__(self) -> Iterator[NDArray[Any]]:
         """The frames, arrays (H, W)."""
         for _, image in self.timed():
             yield image

@@ -1,8 +1,9 @@
 //! numpy arrays in, core frames out, and back. Messages name the argument, what it was and what is accepted.
 
+use super::samples::{exact_samples, is_masked, refuse_path};
 use crate::errors::{Outcome, Raised};
 use jacoflow::buffer_pool;
-use jacoflow::error::Error;
+use jacoflow::error::{Error, check_memory, shape_text};
 use jacoflow::types::{AnyFrame, Frame, Mask, Sample};
 use numpy::ndarray::{ArrayView, IntoDimension, ShapeBuilder};
 use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
@@ -11,17 +12,22 @@ use pyo3::prelude::*;
 use pyo3::types::{PyIterator, PyList};
 
 /// Sample types that frames may have, for messages.
-const ACCEPTED: &str = "an array of uint8, uint16, float32 or float64";
+const ACCEPTED: &str = "an array of bool, integers of 8 to 64 bits, float16, float32 or float64";
 
 /// `object` as a numpy array: itself, or what `numpy.asarray` makes of it. Misaligned memory and that of
 /// another byte order is copied.
 pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
-    let py = object.py();
-    if object.hasattr("mask")? && object.is_instance_of::<PyUntypedArray>() {
+    if is_masked(object)? {
         return Err(PyTypeError::new_err(format!(
             "{argument}: expected a plain array, got a masked one; pass its `data`, and the option mask=~frame.mask where there is one"
         )).into());
     }
+    native(object)
+}
+
+/// As [`as_array`], of masked arrays too, which stay masked.
+fn native<'py>(object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
+    let py = object.py();
     let array = if let Ok(array) = object.cast::<PyUntypedArray>() {
         array.clone()
     } else {
@@ -41,6 +47,12 @@ pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> Outcome<Boun
 /// numpy's name of the array's element type.
 pub fn dtype_name(array: &Bound<'_, PyUntypedArray>) -> String {
     array.dtype().str().map_or_else(|_| "unknown".into(), |name| name.to_string())
+}
+
+/// Refuses an array whose copy in working precision does not fit into memory: a view of one sample may have
+/// any shape.
+pub fn check_size(argument: &str, array: &Bound<'_, PyUntypedArray>) -> Outcome<()> {
+    Ok(check_memory(argument, array.len().checked_mul(size_of::<f64>()))?)
 }
 
 /// The elements in row-major order, for any strides.
@@ -83,7 +95,19 @@ impl ColourRule {
 
 /// One frame `(H, W)`, or `(H, W, 3 or 4)` where colour is allowed.
 pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
-    let array = as_array(argument, object)?;
+    refuse_path(argument, object)?;
+    converted(argument, as_array(argument, object)?, colour)
+}
+
+/// As [`frame`], of masked arrays too: their masked pixels are NaN, which no estimate uses.
+pub fn frame_with_gaps(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
+    refuse_path(argument, object)?;
+    converted(argument, native(object)?, colour)
+}
+
+fn converted(argument: &str, array: Bound<'_, PyUntypedArray>, colour: ColourRule) -> Outcome<AnyFrame> {
+    check_size(argument, &array)?;
+    let array = exact_samples(argument, array)?;
     let shape = array.shape().to_vec();
     match shape[..] {
         [height, width] => {
@@ -103,11 +127,15 @@ pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> O
                 .unwrap_or_else(|| Err(wrong_dtype(argument, &array).into()))
         }
         [_, _, 3 | 4] => Err(PyValueError::new_err(format!(
-            "{argument}: expected a grey frame (H, W), got a colour frame {shape:?}; \
-             convert it with jacoflow.luminance(frame), or pass colour=\"luminance\" where there is that option"
+            "{argument}: expected a grey frame (H, W), got a colour frame {}; \
+             convert it with jacoflow.luminance(frame), or pass colour=\"luminance\" where there is that option",
+            shape_text(&shape)
         ))
         .into()),
-        _ => Err(PyValueError::new_err(format!("{argument}: expected a frame (H, W), got shape {shape:?}")).into()),
+        _ => {
+            let message = format!("{argument}: expected a frame (H, W), got shape {}", shape_text(&shape));
+            Err(PyValueError::new_err(message).into())
+        }
     }
 }
 
@@ -151,14 +179,16 @@ impl<'py> Frames<'py> {
             let list = PyList::new(object.py(), list)?;
             return Ok(Self { count: list.len(), object: list.into_any(), colour });
         }
-        let array = as_array("frames", object)?;
+        refuse_path("frames", object)?;
+        let array = native(object)?;
         let shape = array.shape().to_vec();
         let wanted = match colour {
             ColourRule::Refuse => "a list of frames (H, W) or a stack (T, H, W)",
             ColourRule::Luminance => "a list of frames or a stack (T, H, W) or (T, H, W, 3 or 4)",
         };
         let refuse = |advice: &str| {
-            let message = format!("frames: expected {wanted}, got an array of shape {shape:?}{advice}");
+            let shown = shape_text(&shape);
+            let message = format!("frames: expected {wanted}, got an array of shape {shown}{advice}");
             Err(PyValueError::new_err(message).into())
         };
         match shape[..] {
@@ -176,7 +206,7 @@ impl<'py> Frames<'py> {
 
     /// Frame `index`.
     pub fn get(&self, index: usize) -> Outcome<AnyFrame> {
-        frame("frames", &self.object.get_item(index)?, self.colour)
+        frame_with_gaps("frames", &self.object.get_item(index)?, self.colour)
     }
 }
 
@@ -188,6 +218,7 @@ pub fn mask(object: &Bound<'_, PyAny>) -> Outcome<Mask> {
 /// A boolean array `(H, W)`.
 pub fn boolean(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<Mask> {
     let array = as_array(argument, object)?;
+    check_size(argument, &array)?;
     let [height, width] = array.shape()[..] else {
         let got = shape_text(array.shape());
         return Err(PyValueError::new_err(format!("{argument}: expected shape (H, W), got {got}")).into());
@@ -208,23 +239,16 @@ pub fn is_boolean(object: &Bound<'_, PyAny>) -> Outcome<bool> {
     Ok(array.dtype().getattr("kind")?.extract::<String>()? == "b")
 }
 
-/// A shape as Python writes it.
-pub fn shape_text(shape: &[usize]) -> String {
-    match shape {
-        [one] => format!("({one},)"),
-        _ => format!("({})", shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")),
-    }
-}
-
 /// An `(N, 2)` array of integers.
 pub fn integer_pairs(argument: &'static str, object: &Bound<'_, PyAny>) -> Outcome<Vec<(i64, i64)>> {
     let array = as_array(argument, object)?;
+    check_size(argument, &array)?;
     let kind: String = array.dtype().getattr("kind")?.extract()?;
     if array.shape() == [0] {
         return Ok(Vec::new());
     }
     if !matches!(array.shape(), [_, 2]) {
-        return Err(Error::argument(argument, "shape (N, 2), columns x and y", format!("{:?}", array.shape())).into());
+        return Err(Error::argument(argument, "shape (N, 2), columns x and y", shape_text(array.shape())).into());
     }
     if !matches!(kind.as_str(), "i" | "u") {
         return Err(PyTypeError::new_err(format!("{argument}: expected integers, got {}", dtype_name(&array))).into());
@@ -243,6 +267,7 @@ pub fn doubles(argument: &'static str, object: &Bound<'_, PyAny>) -> Outcome<(Ve
         if own { PyValueError::new_err(said()) } else { error }
     };
     let array = as_array(argument, object).map_err(ragged)?;
+    check_size(argument, &array)?;
     let kind: String = array.dtype().getattr("kind")?.extract()?;
     if !matches!(kind.as_str(), "f" | "i" | "u") {
         return Err(

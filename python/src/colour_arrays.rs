@@ -1,15 +1,21 @@
 //! Colour frames (H, W, 3) out of numpy arrays, and back.
 
-use super::{arrays::as_array, arrays::dtype_name, arrays::elements, arrays::owned, arrays::wrong_dtype};
+use super::samples::exact_samples;
+use super::{
+    arrays::as_array, arrays::check_size, arrays::dtype_name, arrays::elements, arrays::owned, arrays::wrong_dtype,
+};
 use crate::errors::{Outcome, Raised};
+use jacoflow::error::shape_text;
 use jacoflow::types::{AnyColourFrame, ColourFrame, Frame, Sample};
 use numpy::{Element, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// One frame `(H, W, 3)` of red, green and blue.
+/// One frame `(H, W, 3)` of red, green and blue, in a type that holds its samples exactly.
 pub fn colour_frame(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<AnyColourFrame> {
     let array = as_array(argument, object)?;
+    check_size(argument, &array)?;
+    let array = exact_samples(argument, array)?;
     match array.shape() {
         &[height, width, 3] => {
             let size = (width, height);
@@ -24,7 +30,8 @@ pub fn colour_frame(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<AnyCol
         ))
         .into()),
         shape => Err(PyValueError::new_err(format!(
-            "{argument}: expected a colour frame (H, W, 3), got shape {shape:?} of {}",
+            "{argument}: expected a colour frame (H, W, 3), got shape {} of {}",
+            shape_text(shape),
             dtype_name(&array)
         ))
         .into()),

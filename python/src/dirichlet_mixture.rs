@@ -4,6 +4,7 @@
 use super::arrays;
 use super::mixture::{Sample, count, covariance_prior, densities_and_shares, entry, numbers, shares};
 use crate::errors::Outcome;
+use crate::interrupt::interruptible;
 use crate::options::{self, Integer};
 use jacoflow::error::Error;
 use jacoflow::mixture::{DirichletMixture, DirichletOptions, Inference, fit_dirichlet, fit_dirichlet_from};
@@ -84,7 +85,7 @@ pub fn mixture_dirichlet_fit<'py>(
     let sample = Sample::new(points, weights)?;
     let options = options(parameters, sample.dimensions)?;
     let shares = shares(responsibilities, options.n_components)?;
-    let mixture = py.detach(|| match &shares {
+    let mixture = interruptible(py, || match &shares {
         Some(shares) => fit_dirichlet_from(&sample.points(), &options, shares),
         None => fit_dirichlet(&sample.points(), &options),
     })?;
@@ -102,6 +103,6 @@ pub fn mixture_dirichlet_densities<'py>(
     let sample = Sample::new(points, None)?;
     let mixture = mixture(components)?;
     let threads = options::threads(threads)?;
-    let (sums, shares) = py.detach(|| threads.install(|| mixture.log_densities(&sample.points())))?;
+    let (sums, shares) = interruptible(py, || threads.install(|| mixture.log_densities(&sample.points())))?;
     densities_and_shares(py, sums, shares)
 }

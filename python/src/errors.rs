@@ -2,7 +2,7 @@
 
 use jacoflow::error::Error;
 use numpy::{AsSliceError, BorrowError};
-use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyOSError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyMemoryError, PyOSError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::{CastError, CastIntoError, create_exception};
 
@@ -67,6 +67,7 @@ impl From<Error> for Raised {
             Error::NotObservable(_) => NotObservableError::new_err(message),
             Error::Numerical(_) => NumericalError::new_err(message),
             Error::Missing(_) => MissingDependencyError::new_err(message),
+            Error::Memory(_) => PyMemoryError::new_err(message),
             Error::Interrupted => PyKeyboardInterrupt::new_err(()),
         })
     }

@@ -1,19 +1,22 @@
 //! `jacoflow.io`: frames in and out, grey or in colour.
 
 use super::arrays::{self, ColourRule};
-use super::{colour_arrays::colour_frame, colour_arrays::from_any_colour_frame, options};
-use crate::errors::Outcome;
+use super::{
+    colour_arrays::colour_frame, colour_arrays::from_any_colour_frame, options, options::Integer, options::named,
+};
+use crate::errors::{Outcome, Raised};
+use crate::image::renamed;
+use crate::interrupt::abandonable;
 use jacoflow::error::Error;
 use jacoflow::io::{
-    Colour, ColourSource, FrameSink, FrameSource, Grey, OpenOptions, open, open_colour, open_colour_sink, open_sink,
-    read_image,
+    Colour, ColourSource, FrameSink, FrameSource, Grey, OpenOptions, PixelSize, PlaneSelection, Slices, kind_of, open,
+    open_colour, open_colour_sink, open_sink, read_plane,
 };
 use jacoflow::types::{AnyColourFrame, AnyFrame};
 use numpy::PyUntypedArrayMethods;
-use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Which frames are read, and what is done with pictures of the other kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,16 +39,6 @@ impl Reading {
             (None | Some("error"), None) => Ok(Self::Grey(ColourRule::Refuse)),
             (Some("luminance"), None) => Ok(Self::Grey(ColourRule::Luminance)),
             (Some(other), None) => refused("colour", "\"error\", \"luminance\" or \"rgb\"", format!("{other:?}")),
-        }
-    }
-
-    /// The words that [`Reading::parse`] reads.
-    fn words(self) -> (Option<&'static str>, Option<&'static str>) {
-        match self {
-            Self::Grey(ColourRule::Refuse) => (None, None),
-            Self::Grey(ColourRule::Luminance) => (Some("luminance"), None),
-            Self::Rgb(Grey::Error) => (Some("rgb"), None),
-            Self::Rgb(Grey::Repeat) => (Some("rgb"), Some("repeat")),
         }
     }
 
@@ -108,98 +101,152 @@ impl Source {
             Self::Rgb(source) => source.frame_rate(),
         }
     }
+    fn time(&self) -> Option<f64> {
+        match self {
+            Self::Grey(source) => source.time(),
+            Self::Rgb(source) => source.time(),
+        }
+    }
+    fn pixel_size(&self) -> Option<PixelSize> {
+        match self {
+            Self::Grey(source) => source.pixel_size(),
+            Self::Rgb(source) => source.pixel_size(),
+        }
+    }
 }
 
-/// Reads frames (H, W), or (H, W, 3) with colour="rgb", one by one from the source of
-/// `jacoflow.io.frames`; memory stays bounded. Samples keep the file's dtype and grey levels.
-#[pyclass(module = "jacoflow.io", frozen)]
-pub struct FrameReader {
-    spec: String,
-    reading: Reading,
-    options: OpenOptions,
-    place: Mutex<Place>,
+/// Frames (H, W), or (H, W, 3) with colour="rgb", one by one; what `jacoflow.io.FrameReader` wraps.
+#[pyclass(module = "jacoflow._jacoflow", name = "_FrameSource", frozen)]
+pub struct PyFrameSource {
+    source: Arc<Mutex<Source>>,
 }
 
-struct Place {
-    source: Source,
-    delivered: usize,
+impl PyFrameSource {
+    fn ask<T: Send>(&self, py: Python<'_>, question: impl FnOnce(&mut Source) -> T + Send) -> T {
+        py.detach(move || question(&mut self.source.lock().unwrap_or_else(PoisonError::into_inner)))
+    }
 }
 
 #[pymethods]
-impl FrameReader {
+impl PyFrameSource {
     fn __iter__(slf: Py<Self>) -> Py<Self> {
         slf
     }
 
     fn __next__<'py>(&self, py: Python<'py>) -> Outcome<Option<Bound<'py, PyAny>>> {
         py.check_signals()?;
-        let frame = py.detach(|| {
-            let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
-            let frame = place.source.next_frame()?;
-            place.delivered += usize::from(frame.is_some());
-            jacoflow::Result::Ok(frame)
-        })?;
+        let source = Arc::clone(&self.source);
+        let frame = abandonable(py, move || source.lock().unwrap_or_else(PoisonError::into_inner).next_frame())?;
         frame.map(|frame| frame.into_array(py)).transpose()
     }
 
     /// Frames left (a count, no unit), where that is known without reading them, else 0.
     fn __length_hint__(&self, py: Python<'_>) -> usize {
-        py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).source.len_hint().unwrap_or(0))
+        self.ask(py, |source| source.len_hint().unwrap_or(0))
     }
 
     /// Frames per second, where the source says so, else None.
     #[getter]
     fn frame_rate(&self, py: Python<'_>) -> Option<f64> {
-        py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).source.frame_rate())
+        self.ask(py, |source| source.frame_rate())
     }
 
-    fn __repr__(&self) -> String {
-        format!("FrameReader({:?})", self.spec)
+    /// Time of the frame read last, s, where the source says so, else None.
+    #[getter]
+    fn time(&self, py: Python<'_>) -> Option<f64> {
+        self.ask(py, |source| source.time())
     }
 
-    fn __reduce__<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> Outcome<(Bound<'py, PyAny>, (String, Option<&str>, Option<&str>, usize, Option<usize>, usize))> {
-        if self.spec == "-" {
-            return Err(PyTypeError::new_err("standard input cannot be pickled").into());
-        }
-        let delivered = py.detach(|| self.place.lock().unwrap_or_else(PoisonError::into_inner).delivered);
-        let OpenOptions { start, stop, step, .. } = self.options;
-        let (colour, grey) = self.reading.words();
-        let reopen = py.import("jacoflow._jacoflow")?.getattr("_open_frames")?;
-        Ok((reopen, (self.spec.clone(), colour, grey, start + delivered * step, stop, step)))
+    /// Width and height of a pixel in `length_unit`, where the source says so, else None.
+    #[getter]
+    fn pixel_pitch(&self, py: Python<'_>) -> Option<(f64, f64)> {
+        self.ask(py, |source| source.pixel_size()).map(|size| size.pitch)
     }
+
+    /// Unit of `pixel_pitch` as the source spells it, else None.
+    #[getter]
+    fn length_unit(&self, py: Python<'_>) -> Option<String> {
+        self.ask(py, |source| source.pixel_size()).map(|size| size.unit)
+    }
+}
+
+/// `channel=None | N`, `z=None | N | "time"`.
+fn plane_selection(channel: Option<Integer>, z: Option<&Bound<'_, PyAny>>) -> Outcome<PlaneSelection> {
+    let channel = channel.map(|channel| options::natural("channel", channel)).transpose()?;
+    let slices = |z: &Bound<'_, PyAny>| match z.extract::<Integer>() {
+        Ok(index) => Ok(Slices::Index(options::natural("z", index)?)),
+        Err(_) if z.extract::<String>().is_ok_and(|word| word == "time") => Ok(Slices::AsTime),
+        Err(_) => Err(Error::argument("z", "an index from 0 or \"time\"", z.repr().map_err(Raised::from)?).into()),
+    };
+    let z: Outcome<Option<Slices>> = z.map(slices).transpose();
+    Ok(PlaneSelection { channel, z: z? })
+}
+
+/// The options of `jacoflow.io.frames`, checked.
+fn request(
+    colour: Option<&str>,
+    grey: Option<&str>,
+    channel: Option<Integer>,
+    z: Option<&Bound<'_, PyAny>>,
+    start: Integer,
+    stop: Option<Integer>,
+    step: Integer,
+) -> Outcome<(Reading, OpenOptions)> {
+    let reading = Reading::parse(colour, grey)?;
+    let mut options = OpenOptions { planes: plane_selection(channel, z)?, ..OpenOptions::default() };
+    options.start = options::natural("start", start)?;
+    options.stop = stop.map(|n| options::natural("stop", n)).transpose()?;
+    options.step = options::count("step", step)?;
+    Ok((reading, options))
+}
+
+/// The name of the kind of source that would be opened, None where there is nothing; checks the options.
+#[pyfunction(name = "_kind_of")]
+#[pyo3(signature = (spec, colour, grey, channel, z, start, stop, step))]
+#[expect(clippy::too_many_arguments, reason = "the options of jacoflow.io.frames")]
+pub fn source_kind(
+    spec: PathBuf,
+    colour: Option<&str>,
+    grey: Option<&str>,
+    channel: Option<Integer>,
+    z: Option<&Bound<'_, PyAny>>,
+    start: Integer,
+    stop: Option<Integer>,
+    step: Integer,
+) -> Outcome<Option<&'static str>> {
+    request(colour, grey, channel, z, start, stop, step)?;
+    Ok(kind_of(&spec.to_string_lossy()))
 }
 
 /// Opens a frame source.
 #[pyfunction(name = "_open_frames")]
-#[pyo3(signature = (spec, colour, grey, start, stop, step))]
+#[pyo3(signature = (spec, colour, grey, channel, z, start, stop, step))]
+#[expect(clippy::too_many_arguments, reason = "the options of jacoflow.io.frames")]
 pub fn open_frames(
     py: Python<'_>,
     spec: PathBuf,
     colour: Option<&str>,
     grey: Option<&str>,
-    start: i64,
-    stop: Option<i64>,
-    step: i64,
-) -> Outcome<FrameReader> {
-    let not_negative = |name: &'static str, value: i64| {
-        usize::try_from(value).map_err(|_| Error::argument(name, "an integer of 0 or more", value))
-    };
-    let reading = Reading::parse(colour, grey)?;
-    let mut options = OpenOptions::default();
-    options.start = not_negative("start", start)?;
-    options.stop = stop.map(|n| not_negative("stop", n)).transpose()?;
-    options.step = options::count("step", options::Integer(step))?;
+    channel: Option<Integer>,
+    z: Option<&Bound<'_, PyAny>>,
+    start: Integer,
+    stop: Option<Integer>,
+    step: Integer,
+) -> Outcome<PyFrameSource> {
+    let (reading, options) = request(colour, grey, channel, z, start, stop, step)?;
     let spec = spec.to_string_lossy().into_owned();
-    let source = py.detach(|| Source::open(&spec, reading, &options))?;
-    Ok(FrameReader { spec, reading, options, place: Mutex::new(Place { source, delivered: 0 }) })
+    let source = abandonable(py, move || Source::open(&spec, reading, &options))?;
+    Ok(PyFrameSource { source: Arc::new(Mutex::new(source)) })
 }
 
 /// Writes frames to a sink: the first one says whether they are grey or in colour.
 #[pyfunction(name = "_write_frames")]
-pub fn write_frames(py: Python<'_>, path: PathBuf, frames: &Bound<'_, PyAny>, frame_rate: f64) -> Outcome<usize> {
+pub fn write_frames(
+    py: Python<'_>,
+    path: PathBuf,
+    frames: &Bound<'_, PyAny>,
+    #[pyo3(from_py_with = named::frame_rate)] frame_rate: f64,
+) -> Outcome<usize> {
     let spec = path.to_string_lossy().into_owned();
     let mut items = frames.try_iter()?;
     let first = items.next().transpose()?;
@@ -208,10 +255,13 @@ pub fn write_frames(py: Python<'_>, path: PathBuf, frames: &Bound<'_, PyAny>, fr
         None => false,
     };
     let items = first.into_iter().map(Ok).chain(items);
+    let named = |error: Error| renamed(error, "output", "path");
     if is_colour {
-        write_all(py, items, open_colour_sink(&spec, frame_rate)?, |item| colour_frame("frames", item))
+        write_all(py, items, open_colour_sink(&spec, frame_rate).map_err(named)?, |item| colour_frame("frames", item))
     } else {
-        write_all(py, items, open_sink(&spec, frame_rate)?, |item| arrays::frame("frames", item, ColourRule::Refuse))
+        write_all(py, items, open_sink(&spec, frame_rate).map_err(named)?, |item| {
+            arrays::frame("frames", item, ColourRule::Refuse)
+        })
     }
 }
 
@@ -234,17 +284,20 @@ fn write_all<'py, F: Send + Sync>(
 
 /// Reads an image file.
 #[pyfunction(name = "_read_image")]
-#[pyo3(signature = (path, colour, grey))]
+#[pyo3(signature = (path, colour, grey, channel, z))]
 pub fn read_one_image<'py>(
     py: Python<'py>,
     path: PathBuf,
     colour: Option<&str>,
     grey: Option<&str>,
+    channel: Option<Integer>,
+    z: Option<&Bound<'py, PyAny>>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let reading = Reading::parse(colour, grey)?;
-    let frame = py.detach(|| match reading {
-        Reading::Grey(_) => read_image(&path, reading.colour()).map(AnyKind::Grey),
-        Reading::Rgb(grey) => read_image(&path, grey).map(AnyKind::Rgb),
+    let planes = plane_selection(channel, z)?;
+    let frame = abandonable(py, move || match reading {
+        Reading::Grey(_) => read_plane(&path, reading.colour(), planes).map(AnyKind::Grey),
+        Reading::Rgb(grey) => read_plane(&path, grey, planes).map(AnyKind::Rgb),
     })?;
     frame.into_array(py)
 }

@@ -2,7 +2,8 @@
 
 use super::arrays::{self, ColourRule};
 use crate::errors::Outcome;
-use crate::options::{self, Integer};
+use crate::interrupt::interruptible;
+use crate::options::{self, Integer, named};
 use jacoflow::image::{Border, GaussianSmoother, Quantiser};
 use jacoflow::types::AnyFrame;
 use pyo3::prelude::*;
@@ -30,8 +31,8 @@ macro_rules! in_precision {
 #[pyo3(signature = (frame, blur_sigma, *, truncate=None, threads=None))]
 pub fn smooth<'py>(
     frame: &Bound<'py, PyAny>,
-    blur_sigma: f64,
-    truncate: Option<f64>,
+    #[pyo3(from_py_with = named::blur_sigma)] blur_sigma: f64,
+    #[pyo3(from_py_with = named::truncate)] truncate: Option<f64>,
     threads: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let py = frame.py();
@@ -42,7 +43,7 @@ pub fn smooth<'py>(
     };
     let smoother = smoother.map_err(|e| renamed(e, "smooth", "blur_sigma"))?;
     let threads = options::threads(threads)?;
-    let smooth = py.detach(|| in_precision!(&frame, frame => threads.install(|| smoother.apply(frame))));
+    let smooth = interruptible(py, || Ok(in_precision!(&frame, frame => threads.install(|| smoother.apply(frame)))))?;
     arrays::from_any_frame(py, smooth)
 }
 
@@ -51,12 +52,15 @@ pub fn smooth<'py>(
 /// Returns a new array (H, W), float64 for float64, else float32. ValueError unless `step` is positive.
 #[pyfunction]
 #[pyo3(signature = (frame, step=None))]
-pub fn quantise<'py>(frame: &Bound<'py, PyAny>, step: Option<f64>) -> Outcome<Bound<'py, PyAny>> {
+pub fn quantise<'py>(
+    frame: &Bound<'py, PyAny>,
+    #[pyo3(from_py_with = named::step)] step: Option<f64>,
+) -> Outcome<Bound<'py, PyAny>> {
     let py = frame.py();
     let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
     let quantiser =
         step.map_or(Ok(Quantiser::default()), Quantiser::new).map_err(|e| renamed(e, "quantise", "step"))?;
-    let levels = py.detach(|| in_precision!(&frame, frame => quantiser.apply(frame)));
+    let levels = interruptible(py, || Ok(in_precision!(&frame, frame => quantiser.apply(frame))))?;
     arrays::from_any_frame(py, levels)
 }
 

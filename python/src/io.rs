@@ -2,11 +2,13 @@
 
 use super::{arrays, field::FlowField, field::Store};
 use crate::errors::Outcome;
-use jacoflow::error::Error;
+use crate::interrupt::abandonable;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::io::{
     FieldFormat, FloatMap, FlowImage, NumberedFiles, npz::NpzReader, read_flo, read_kitti, read_npz_from, read_pfm,
     write_flo, write_kitti, write_pfm,
 };
+use jacoflow::types::AnyField;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -24,7 +26,7 @@ pub fn flow_image(argument: &'static str, flow: &Bound<'_, PyAny>) -> Outcome<Fl
     }
     let (shape, values) = arrays::doubles(argument, flow)?;
     let [height, width, 2] = shape[..] else {
-        return Err(Error::argument(argument, "shape (H, W, 2)", format!("shape {shape:?}")).into());
+        return Err(Error::argument(argument, "shape (H, W, 2)", format!("shape {}", shape_text(&shape))).into());
     };
     let plane = |k: usize| values.iter().skip(k).step_by(2).map(|&v| v as f32).collect();
     Ok(FlowImage::new(width, height, plane(0), plane(1))?)
@@ -38,10 +40,8 @@ fn from_flow_image<'py>(py: Python<'py>, flow: &FlowImage) -> Outcome<Bound<'py,
 /// Reads flow in one of the exchange formats.
 #[pyfunction(name = "_read_flow")]
 pub fn read_flow<'py>(py: Python<'py>, path: PathBuf, format: &str) -> Outcome<Bound<'py, PyAny>> {
-    let flow = py.detach(|| match format {
-        "kitti" => read_kitti(&path),
-        _ => read_flo(&path),
-    })?;
+    let is_kitti = format == "kitti";
+    let flow = abandonable(py, move || if is_kitti { read_kitti(&path) } else { read_flo(&path) })?;
     from_flow_image(py, &flow)
 }
 
@@ -58,7 +58,7 @@ pub fn write_flow(py: Python<'_>, path: PathBuf, flow: &Bound<'_, PyAny>, format
 /// Reads a float map.
 #[pyfunction(name = "_read_pfm")]
 pub fn read_float_map(py: Python<'_>, path: PathBuf) -> Outcome<Bound<'_, PyAny>> {
-    let map = py.detach(|| read_pfm(&path))?;
+    let map = abandonable(py, move || read_pfm(&path))?;
     let mut planes = map.planes;
     if planes.len() == 1 {
         return arrays::owned(py, &[map.height, map.width], planes.remove(0));
@@ -75,7 +75,12 @@ pub fn write_float_map(py: Python<'_>, path: PathBuf, values: &Bound<'_, PyAny>)
         [height, width] => (height, width, 1),
         [height, width, 3] => (height, width, 3),
         _ => {
-            return Err(Error::argument("values", "shape (H, W) or (H, W, 3)", format!("shape {shape:?}")).into());
+            return Err(Error::argument(
+                "values",
+                "shape (H, W) or (H, W, 3)",
+                format!("shape {}", shape_text(&shape)),
+            )
+            .into());
         }
     };
     let plane = |k: usize| values.iter().skip(k).step_by(count).map(|&v| v as f32).collect();
@@ -101,6 +106,7 @@ pub fn save_field(py: Python<'_>, field: &FlowField, path: &Path, options: &str)
         (Some(format), false) => write_one(py, field, 0, format, path, options),
         (None, true) => {
             let names = NumberedFiles::create(path, "flow", FieldFormat::Npz.extension())?;
+            names.clear()?;
             for index in 0..count {
                 py.check_signals()?;
                 let name = names.path(field.first_frame() + index);
@@ -141,25 +147,31 @@ fn write_one(
 pub fn load_field(py: Python<'_>, path: &Path) -> Outcome<FlowField> {
     let format =
         format_of(path)?.ok_or_else(|| Error::argument("path", "a file name with extension", path.display()))?;
-    let image = |flow: jacoflow::Result<FlowImage>| flow.and_then(|flow| flow.to_field());
-    let flat = match format {
-        FieldFormat::Npz => return load_npz(py, path),
-        FieldFormat::Flo => py.detach(|| image(read_flo(path)))?,
-        FieldFormat::Kitti => py.detach(|| image(read_kitti(path)))?,
-        FieldFormat::Pfm => py.detach(|| {
-            let map = read_pfm(path)?;
-            let [u, v, _] = <[Vec<f32>; 3]>::try_from(map.planes)
-                .map_err(|_| Error::format(path, "expected three planes (u, v, 0), got one"))?;
-            image(FlowImage::new(map.width, map.height, u, v))
-        })?,
-    };
-    Ok(FlowField::single(flat))
+    let path = path.to_path_buf();
+    let field = abandonable(py, move || {
+        let flow = match format {
+            FieldFormat::Npz => return load_npz(&path),
+            FieldFormat::Flo => read_flo(path)?,
+            FieldFormat::Kitti => read_kitti(path)?,
+            FieldFormat::Pfm => {
+                let map = read_pfm(&path)?;
+                let [u, v, _] = <[Vec<f32>; 3]>::try_from(map.planes)
+                    .map_err(|_| Error::format(path, "expected three planes (u, v, 0), got one"))?;
+                FlowImage::new(map.width, map.height, u, v)?
+            }
+        };
+        Ok(AnyField::Single(flow.to_field()?))
+    })?;
+    Ok(match field {
+        AnyField::Single(field) => FlowField::single(field),
+        AnyField::Double(field) => FlowField::single(field),
+    })
 }
 
-fn load_npz(py: Python<'_>, path: &Path) -> Outcome<FlowField> {
+fn load_npz(path: &Path) -> jacoflow::Result<AnyField> {
     let mut npz = NpzReader::open(path)?;
     if npz.array::<f64>("motion").is_ok() {
-        return Ok(FlowField::single(py.detach(|| read_npz_from::<f64, _>(&mut npz))?.field));
+        return Ok(AnyField::Double(read_npz_from::<f64, _>(&mut npz)?.field));
     }
-    Ok(FlowField::single(py.detach(|| read_npz_from::<f32, _>(&mut npz))?.field))
+    Ok(AnyField::Single(read_npz_from::<f32, _>(&mut npz)?.field))
 }

@@ -13,7 +13,7 @@ macro_rules! with_common {
             grid: Object as Object = None,
             mask: Object as Object = None,
             preprocess: Object as Object = None,
-            fps: Option<f64> as Option<f64> = None,
+            fps: Object as Object = None,
             pixel_pitch: Object as Object = None,
             length_unit: Option<String> as Option<String> = None,
             precision: Option<String> as Option<String> = None,

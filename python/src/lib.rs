@@ -17,6 +17,7 @@ mod flow_filter;
 mod frames;
 mod gauss_markov;
 mod image;
+mod interrupt;
 mod io;
 mod keywords;
 mod mixture;
@@ -29,6 +30,7 @@ mod progress;
 #[cfg(feature = "reference")]
 mod reference_track;
 mod region;
+mod samples;
 mod scenes;
 mod segment;
 mod stereo;
@@ -59,7 +61,7 @@ mod _jacoflow {
             UnscentedKalmanFilter, resample, restore_extended, restore_kalman, restore_particle, restore_unscented,
         },
         flow_filter::{FlowFilter, restore_filter},
-        frames::{FrameReader, open_frames, read_one_image, write_frames},
+        frames::{PyFrameSource, open_frames, read_one_image, source_kind, write_frames},
         gauss_markov::PyGaussMarkovFilter,
         image::{luminance, quantise, smooth},
         io::{read_float_map, read_flow, write_float_map, write_flow},
@@ -74,9 +76,9 @@ mod _jacoflow {
         scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters},
         segment::{segment_felzenszwalb, segment_region_means},
         stereo::{edge_disparity, edge_pixels, estimate_row_offset, read_disparity, write_disparity},
-        stereo_track::{PyStereoTracker, PyTrackGraph},
+        stereo_track::{PyStereoTracker, PyTrackGraph, restore_stereo_tracker},
         target_scenes::{TargetScene, target_scene_names},
-        track::{PyGradientTracker, detect},
+        track::{PyGradientTracker, detect, restore_gradient_tracker},
     };
 
     #[pymodule_export]

@@ -3,8 +3,9 @@
 
 use super::arrays;
 use crate::errors::Outcome;
+use crate::interrupt::interruptible;
 use crate::options::{self, Integer};
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::mixture::{
     CovariancePrior, Fit, MixtureOptions, Moments, Points, Posterior, Prior, Retained, Seeding, Start, fit, partial_fit,
 };
@@ -48,7 +49,7 @@ pub(super) fn covariance_prior(from: &Bound<'_, PyDict>, dimensions: usize) -> O
         Some((shape, values)) if shape == [dimensions, dimensions] => Ok(CovariancePrior::Full(values)),
         Some((shape, _)) => {
             let expected = format!("a number or a matrix ({dimensions}, {dimensions})");
-            Err(Error::argument("covariance_prior", expected, format!("shape {shape:?}")).into())
+            Err(Error::argument("covariance_prior", expected, format!("shape {}", shape_text(&shape))).into())
         }
     }
 }
@@ -60,7 +61,7 @@ pub(super) fn shares(given: Option<&Bound<'_, PyAny>>, components: usize) -> Out
     };
     if shape.len() != 2 || shape[1] != components {
         let expected = format!("responsibilities (N, {components})");
-        return Err(Error::argument("resp", expected, format!("shape {shape:?}")).into());
+        return Err(Error::argument("resp", expected, format!("shape {}", shape_text(&shape))).into());
     }
     Ok(Some(shares))
 }
@@ -100,11 +101,11 @@ impl Sample {
     pub fn new(x: &Bound<'_, PyAny>, weights: Option<&Bound<'_, PyAny>>) -> Outcome<Self> {
         let (shape, values) = arrays::doubles("X", x)?;
         let [_, dimensions] = shape[..] else {
-            return Err(Error::argument("X", "points (N, D)", format!("shape {shape:?}")).into());
+            return Err(Error::argument("X", "points (N, D)", format!("shape {}", shape_text(&shape))).into());
         };
         let weights = weights.map(|weights| arrays::doubles("sample_weight", weights)).transpose()?;
         if let Some((shape, _)) = weights.as_ref().filter(|(shape, _)| shape.len() != 1) {
-            return Err(Error::argument("sample_weight", "weights (N)", format!("shape {shape:?}")).into());
+            return Err(Error::argument("sample_weight", "weights (N)", format!("shape {}", shape_text(shape))).into());
         }
         Ok(Self { dimensions, values, weights: weights.map(|(_, values)| values) })
     }
@@ -191,7 +192,7 @@ pub fn mixture_fit<'py>(
     let options = options(parameters, sample.dimensions)?;
     let shares = shares(responsibilities, options.components)?;
     let components = start.map(posterior).transpose()?;
-    let result = py.detach(|| {
+    let result = interruptible(py, || {
         let start = match (&shares, &components) {
             (Some(shares), _) => Start::Responsibilities(shares),
             (None, Some(components)) => Start::Components(components),
@@ -215,7 +216,7 @@ pub fn mixture_partial_fit<'py>(
     let sample = Sample::new(points, weights)?;
     let options = options(parameters, sample.dimensions)?;
     let earlier = earlier.map(retained).transpose()?;
-    let result = py.detach(|| partial_fit(&sample.points(), &options, earlier.as_ref(), forgetting))?;
+    let result = interruptible(py, || partial_fit(&sample.points(), &options, earlier.as_ref(), forgetting))?;
     fit_dict(py, result)
 }
 
@@ -230,7 +231,7 @@ pub fn mixture_densities<'py>(
     let sample = Sample::new(points, None)?;
     let components = posterior(components)?;
     let threads = options::threads(threads)?;
-    let (sums, shares) = py.detach(|| threads.install(|| components.log_densities(&sample.points())))?;
+    let (sums, shares) = interruptible(py, || threads.install(|| components.log_densities(&sample.points())))?;
     densities_and_shares(py, sums, shares)
 }
 

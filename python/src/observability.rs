@@ -4,6 +4,7 @@ use super::arrays::{self, Frames};
 use super::image::renamed;
 use super::options::{self, Object, PreprocessOptions};
 use crate::errors::Outcome;
+use crate::interrupt::interruptible;
 use jacoflow::error::Error;
 use jacoflow::flow::{Observability, observability as core};
 use jacoflow::jet::TimeScheme;
@@ -48,7 +49,7 @@ pub fn observability<'py>(
             core(frames.each_ref(), scheme, &neighbourhood, threads)
         }};
     }
-    let map = py.detach(|| match &frames {
+    let map = interruptible(py, || match &frames {
         [AnyFrame::F64(a), AnyFrame::F64(b), AnyFrame::F64(c)] => map_of!([a, b, c].map(Clone::clone)),
         frames => map_of!(frames.each_ref().map(AnyFrame::to_real::<f32>)),
     })?;

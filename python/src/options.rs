@@ -9,7 +9,7 @@ use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
 use jacoflow::types::{AnyFrame, Mask, Precision, Rect, Sample, SamplingGrid, Units};
 use pyo3::conversion::FromPyObjectOwned;
-use pyo3::exceptions::{PyOverflowError, PyTypeError};
+use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 /// An integer argument. One that 64 bits do not hold becomes the nearest that they do, so that it is refused
@@ -31,6 +31,62 @@ impl<'py> FromPyObject<'_, 'py> for Integer {
     }
 }
 
+/// A type of numbers of the core, and what it holds, for messages.
+pub trait Number: Sized {
+    /// What it holds.
+    const RANGE: &str;
+}
+
+macro_rules! numbers {
+    ($($type:ty: $range:literal),* $(,)?) => {$(
+        impl Number for $type {
+            const RANGE: &str = $range;
+        }
+    )*};
+}
+numbers!(
+    usize: "an integer from 0 to 2^64 - 1",
+    u64: "an integer from 0 to 2^64 - 1",
+    u32: "an integer from 0 to 2^32 - 1",
+    i32: "an integer from -2^31 to 2^31 - 1",
+    f64: "a number up to 1.8e308",
+    (f64, f64): "numbers up to 1.8e308",
+);
+
+impl<T: Number> Number for Option<T> {
+    const RANGE: &str = T::RANGE;
+}
+
+/// The argument called `name`: a number that its type does not hold is refused by name.
+fn number<'py, T: Number + FromPyObjectOwned<'py>>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<T> {
+    value.extract::<T>().map_err(|error| {
+        let error: PyErr = error.into();
+        if error.is_instance_of::<PyOverflowError>(value.py()) {
+            let words = value.str().map_or_else(|_| "a larger one".into(), |text| text.to_string());
+            let got: String = words.chars().take(MAX_DIGITS).collect();
+            return PyValueError::new_err(format!("{name}: expected {}, got {got}", T::RANGE));
+        }
+        error
+    })
+}
+
+/// Digits of a number in a message.
+const MAX_DIGITS: usize = 40;
+
+/// Arguments that are numbers, by their names, for `from_py_with`.
+pub mod named {
+    use super::{Bound, FromPyObjectOwned, Number, PyAny, PyResult, number};
+
+    macro_rules! arguments {
+        ($($name:ident)*) => {$(
+            pub fn $name<'py, T: Number + FromPyObjectOwned<'py>>(value: &Bound<'py, PyAny>) -> PyResult<T> {
+                number(stringify!($name), value)
+            }
+        )*};
+    }
+    arguments!(between blur_sigma classes colour_cast duration forward_backward frame_rate index levels max_count max_steps min_distance min_eigenvalue min_step n_components n_near n_particles noise origin prior_radius quality random_state scale search start step t truncate window x y);
+}
+
 /// The argument `region`, any sequence (x, y, width, height), px.
 #[derive(Debug, Clone, Copy, IntoPyObject, IntoPyObjectRef)]
 #[pyo3(transparent)]
@@ -41,7 +97,9 @@ impl<'py> FromPyObject<'_, 'py> for Region {
 
     fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
         let wrong = || PyTypeError::new_err("region: expected four integers (x, y, width, height)");
-        let items: Vec<Bound<'_, PyAny>> = object.try_iter().and_then(Iterator::collect).map_err(|_| wrong())?;
+        // No more than are needed: there may be very many.
+        let items = object.try_iter().and_then(|items| items.take(5).collect());
+        let items: Vec<Bound<'_, PyAny>> = items.map_err(|_| wrong())?;
         let numbers: Vec<Integer> =
             items.iter().map(PyAnyMethods::extract).collect::<PyResult<_>>().map_err(|_| wrong())?;
         let [Integer(x), Integer(y), Integer(width), Integer(height)] = numbers[..] else { return Err(wrong()) };
@@ -102,6 +160,11 @@ pub fn count(name: &'static str, Integer(value): Integer) -> Outcome<usize> {
         .ok_or_else(|| Error::argument(name, "a positive integer", value).into())
 }
 
+/// A count or an index, at least 0.
+pub fn natural(name: &'static str, Integer(value): Integer) -> Outcome<usize> {
+    Ok(usize::try_from(value).map_err(|_| Error::argument(name, "an integer of 0 or more", value))?)
+}
+
 /// `threads`: a positive number, or all.
 pub fn threads(value: Option<Integer>) -> Outcome<Threads> {
     Ok(Threads::new(value.map(|n| count("threads", n)).transpose()?)?)
@@ -157,9 +220,14 @@ pub fn neighbourhood(value: &Bound<'_, PyAny>) -> Outcome<Neighbourhood> {
     Ok(Neighbourhood::Points { offsets, sigma: None })
 }
 
+/// A number that may be absent.
+pub fn real(py: Python<'_>, name: &str, value: &Object) -> Outcome<Option<f64>> {
+    Ok(value.as_ref().map(|value| number(name, value.bind(py))).transpose()?)
+}
+
 /// `fps`, as seconds between frames.
-fn frame_period(fps: Option<f64>) -> Outcome<Option<f64>> {
-    match fps {
+fn frame_period(py: Python<'_>, fps: &Object) -> Outcome<Option<f64>> {
+    match real(py, "fps", fps)? {
         Some(fps) if !(fps.is_finite() && fps > 0.0) => {
             Err(Error::argument("fps", "a positive number of frames per second", fps).into())
         }
@@ -195,8 +263,8 @@ impl PreprocessOptions {
 }
 
 /// `pixel_pitch`, one length for both axes or (dx, dy), `length_unit` and `fps`.
-pub fn units(py: Python<'_>, pitch: &Object, length: Option<&str>, fps: Option<f64>) -> Outcome<Units> {
-    let period = frame_period(fps)?;
+pub fn units(py: Python<'_>, pitch: &Object, length: Option<&str>, fps: &Object) -> Outcome<Units> {
+    let period = frame_period(py, fps)?;
     let Some(value) = pitch else {
         return match length {
             None => Ok(Units::new((1.0, 1.0), None, period)),

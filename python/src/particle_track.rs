@@ -12,26 +12,20 @@ use self::options::Given;
 use super::arrays::{self, ColourRule};
 use super::colour_arrays::colour_frame;
 use crate::errors::Outcome;
+use crate::interrupt::{Held, interruptible};
 use jacoflow::error::Error;
 use jacoflow::track::ParticleTracker;
 use jacoflow::types::{AnyColourFrame, AnyFrame, Frame, TargetBox};
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// The compiled part of `jacoflow.track.ParticleTracker`.
 #[pyclass(name = "_ParticleTracker", module = "jacoflow._jacoflow", frozen)]
 pub struct PyParticleTracker {
-    tracker: Mutex<ParticleTracker>,
+    tracker: Held<ParticleTracker>,
     /// Whether frames (H, W) are taken as red = green = blue.
     takes_grey: bool,
-}
-
-impl PyParticleTracker {
-    fn lock(&self) -> MutexGuard<'_, ParticleTracker> {
-        self.tracker.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 #[pymethods]
@@ -43,8 +37,8 @@ impl PyParticleTracker {
         let py = frame.py();
         let frame = coloured(frame, takes_grey)?;
         let boxes: Vec<(u64, TargetBox)> = boxes.into_iter().map(|(id, sides)| (id, target_box(sides))).collect();
-        let tracker = py.detach(|| ParticleTracker::new(&frame, &boxes, &options))?;
-        Ok(Self { tracker: Mutex::new(tracker), takes_grey })
+        let tracker = interruptible(py, || ParticleTracker::new(&frame, &boxes, &options))?;
+        Ok(Self { tracker: Held::new(tracker), takes_grey })
     }
 
     /// The targets in the next frame; `camera`: the background's motion since the one before, where it is
@@ -52,8 +46,7 @@ impl PyParticleTracker {
     fn update(&self, frame: &Bound<'_, PyAny>, camera: Option<[[f64; 3]; 2]>) -> Outcome<PyParticleStep> {
         let py = frame.py();
         let frame = coloured(frame, self.takes_grey)?;
-        let record = py.detach(|| {
-            let mut tracker = self.lock();
+        let record = self.tracker.change(py, |tracker| {
             tracker.update_with_camera(&frame, camera)?;
             Ok::<_, Error>(tracker.record())
         })?;
@@ -63,22 +56,22 @@ impl PyParticleTracker {
     /// Adds a target at the last frame; returns its number.
     #[pyo3(signature = (bounds, id))]
     fn add(&self, py: Python<'_>, bounds: [f64; 4], id: Option<u64>) -> Outcome<u64> {
-        Ok(py.detach(|| self.lock().add(id, target_box(bounds)))?)
+        Ok(self.tracker.with(py, |tracker| tracker.add(id, target_box(bounds)))??)
     }
 
     /// Removes a target.
     fn remove(&self, py: Python<'_>, id: u64) -> Outcome<()> {
-        Ok(py.detach(|| self.lock().remove(id))?)
+        Ok(self.tracker.with(py, |tracker| tracker.remove(id))??)
     }
 
     /// The targets at the last frame.
-    fn step(&self, py: Python<'_>) -> PyParticleStep {
-        PyParticleStep(py.detach(|| self.lock().record()))
+    fn step(&self, py: Python<'_>) -> Outcome<PyParticleStep> {
+        Ok(PyParticleStep(self.tracker.with(py, |tracker| tracker.record())?))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Outcome<(Bound<'py, PyAny>, (Bound<'py, PyBytes>, bool))> {
         let (py, this) = (slf.py(), slf.get());
-        let bytes = py.detach(|| this.lock().to_bytes());
+        let bytes = this.tracker.with(py, |tracker| tracker.to_bytes())?;
         let restore = py.import("jacoflow._jacoflow")?.getattr("_restore_particle_tracker")?;
         Ok((restore, (PyBytes::new(py, &bytes), this.takes_grey)))
     }
@@ -88,7 +81,7 @@ impl PyParticleTracker {
 #[pyfunction(name = "_restore_particle_tracker")]
 pub fn restore_tracker(py: Python<'_>, state: &[u8], takes_grey: bool) -> Outcome<PyParticleTracker> {
     let tracker = py.detach(|| ParticleTracker::from_bytes(state))?;
-    Ok(PyParticleTracker { tracker: Mutex::new(tracker), takes_grey })
+    Ok(PyParticleTracker { tracker: Held::new(tracker), takes_grey })
 }
 
 fn target_box([x, y, width, height]: [f64; 4]) -> TargetBox {

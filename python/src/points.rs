@@ -2,8 +2,9 @@
 
 use super::arrays::{self, ColourRule};
 use crate::errors::Outcome;
-use crate::options::{self, Integer};
-use jacoflow::error::Error;
+use crate::interrupt::interruptible;
+use crate::options::{self, Integer, named};
+use jacoflow::error::{Error, shape_text};
 use jacoflow::flow::points::{PointFlowOptions, PointPyramid, track_points};
 use jacoflow::image::{CornerOptions, corner_score, select_corners};
 use jacoflow::types::Frame;
@@ -14,7 +15,7 @@ fn points(argument: &'static str, object: &Bound<'_, PyAny>) -> Outcome<Vec<[f64
     let (shape, values) = arrays::doubles(argument, object)?;
     match shape[..] {
         [0] | [_, 2] => Ok(values.as_chunks::<2>().0.to_vec()),
-        _ => Err(Error::argument(argument, "shape (N, 2), columns x and y", format!("{shape:?}")).into()),
+        _ => Err(Error::argument(argument, "shape (N, 2), columns x and y", shape_text(&shape)).into()),
     }
 }
 
@@ -44,10 +45,10 @@ fn pairs(py: Python<'_>, points: Vec<[f64; 2]>) -> Outcome<Bound<'_, PyAny>> {
 ))]
 pub fn corners<'py>(
     frame: &Bound<'py, PyAny>,
-    max_count: usize,
-    quality: f64,
-    min_distance: f64,
-    window: usize,
+    #[pyo3(from_py_with = named::max_count)] max_count: usize,
+    #[pyo3(from_py_with = named::quality)] quality: f64,
+    #[pyo3(from_py_with = named::min_distance)] min_distance: f64,
+    #[pyo3(from_py_with = named::window)] window: usize,
     existing: Option<Bound<'py, PyAny>>,
     threads: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {
@@ -57,7 +58,7 @@ pub fn corners<'py>(
     options.check()?;
     let existing = existing.map_or(Ok(Vec::new()), |existing| points("existing", &existing))?;
     let frame = grey("frame", frame)?;
-    let found = py.detach(|| {
+    let found = interruptible(py, || {
         threads.install(|| corner_score(&frame, window).map(|score| select_corners(&score, &existing, &options)))
     })?;
     pairs(py, found)
@@ -97,12 +98,12 @@ pub fn point_flow<'py>(
     after: &Bound<'py, PyAny>,
     points: &Bound<'py, PyAny>,
     guesses: Option<Bound<'py, PyAny>>,
-    levels: usize,
-    window: usize,
-    max_steps: usize,
-    min_step: f64,
-    forward_backward: Option<f64>,
-    min_eigenvalue: Option<f64>,
+    #[pyo3(from_py_with = named::levels)] levels: usize,
+    #[pyo3(from_py_with = named::window)] window: usize,
+    #[pyo3(from_py_with = named::max_steps)] max_steps: usize,
+    #[pyo3(from_py_with = named::min_step)] min_step: f64,
+    #[pyo3(from_py_with = named::forward_backward)] forward_backward: Option<f64>,
+    #[pyo3(from_py_with = named::min_eigenvalue)] min_eigenvalue: Option<f64>,
     threads: Option<Integer>,
 ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let py = before.py();
@@ -121,7 +122,7 @@ pub fn point_flow<'py>(
         min_eigenvalue: min_eigenvalue.unwrap_or_else(scaled),
         simd: None,
     };
-    let found = py.detach(|| {
+    let found = interruptible(py, || {
         threads.install(|| {
             let [before, after] = [before, after].map(|frame| PointPyramid::new(frame, levels));
             track_points(&before, &after, &points, guesses.as_deref(), &options)

@@ -5,7 +5,8 @@ use super::arrays;
 use super::options::{Integer, count};
 use super::track::{PyGradientTracker, begin, camera_of, pair, word};
 use crate::errors::Outcome;
-use jacoflow::error::{Error, Result};
+use crate::interrupt::interruptible;
+use jacoflow::error::{Error, Result, shape_text};
 use jacoflow::track::GradientTracker;
 use jacoflow::track::gradient::reference::{
     Control, LocalFlow, LocalFlowOptions, MeanFlow, Method, ReferenceOptions, derivative_kernels, local_flow,
@@ -13,7 +14,6 @@ use jacoflow::track::gradient::reference::{
 use jacoflow::types::Frame;
 use numpy::{PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use std::sync::PoisonError;
 
 /// The compiled part of `jacoflow.reference.ReferenceTracker`.
 #[pyfunction(name = "_reference_tracker")]
@@ -45,9 +45,9 @@ pub fn tracker(
 #[pymethods]
 impl PyGradientTracker {
     /// Center of the window that is searched, px, and how many pixels moved in it; None before it starts.
-    fn search_window(&self) -> Option<([f64; 2], usize)> {
-        let window = self.0.lock().unwrap_or_else(PoisonError::into_inner).tracker.search_window();
-        window.map(|window| (window.center, window.flow_count))
+    fn search_window(&self, py: Python<'_>) -> Outcome<Option<([f64; 2], usize)>> {
+        let window = self.0.with(py, |following| following.tracker.search_window())?;
+        Ok(window.map(|window| (window.center, window.flow_count)))
     }
 }
 
@@ -62,7 +62,7 @@ pub fn mean_flow(
         return Err(Error::argument("min_speed", "a speed in px/frame, at least 0", min_speed).into());
     }
     let ([height, width, 2], [rows, columns]) = (flow.shape(), accepted.shape()) else {
-        return Err(Error::argument("flow", "an array (H, W, 2)", format!("shape {:?}", flow.shape())).into());
+        return Err(Error::argument("flow", "an array (H, W, 2)", format!("shape {}", shape_text(flow.shape()))).into());
     };
     if (height, width) != (rows, columns) {
         let expected = format!("an array ({height}, {width}) like the flow");
@@ -108,7 +108,7 @@ pub fn gradient_flow<'py>(
     let options = LocalFlowOptions { window, order, cond_max, min_sigma, step_max };
     check(&options)?;
     let (first, second) = pair(first, second)?;
-    let LocalFlow { flow, accepted } = py.detach(|| local_flow(&first, &second, &options));
+    let LocalFlow { flow, accepted } = interruptible(py, || Ok(local_flow(&first, &second, &options)))?;
     let (width, height) = flow.size();
     let values = flow.data().iter().flatten().copied().collect();
     let flow = arrays::owned::<f64>(py, &[height, width, 2], values)?.into_any();

@@ -2,7 +2,7 @@
 
 use crate::arrays;
 use crate::errors::Outcome;
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::types::{Rect, Region};
 use pyo3::prelude::*;
 
@@ -24,18 +24,16 @@ pub fn parse(object: Option<&Bound<'_, PyAny>>) -> Outcome<Option<Region>> {
         (_, &[x, y, width, height]) if shape == [4] => rectangle([x, y, width, height]).map(Some),
         (_, &[x, y, radius]) if shape == [3] => Ok(Some(Region::Disc { centre: (x, y), radius })),
         ([_, 2], _) => Ok(Some(Region::Polygon(values.as_chunks::<2>().0.iter().map(|&[x, y]| (x, y)).collect()))),
-        _ => Err(Error::argument("region", EXPECTED, format!("shape {}", arrays::shape_text(&shape))).into()),
+        _ => Err(Error::argument("region", EXPECTED, format!("shape {}", shape_text(&shape))).into()),
     }
 }
 
 fn rectangle(values: [f64; 4]) -> Outcome<Region> {
     let whole = |value: f64| (value >= 0.0 && value.fract() == 0.0 && value < 1e15).then_some(value as usize);
-    match values.map(whole) {
-        [Some(x), Some(y), Some(width), Some(height)] => Ok(Region::Rect(Rect { x, y, width, height })),
-        _ => {
-            let [x, y, width, height] = values;
-            let got = format!("({x}, {y}, {width}, {height})");
-            Err(Error::argument("region", "(x, y, width, height), whole px, none negative", got).into())
-        }
+    if let [Some(x), Some(y), Some(width), Some(height)] = values.map(whole) {
+        return Ok(Region::Rect(Rect { x, y, width, height }));
     }
+    let [x, y, width, height] = values;
+    let got = format!("({x}, {y}, {width}, {height})");
+    Err(Error::argument("region", "(x, y, width, height), whole px, none negative", got).into())
 }

@@ -1,8 +1,9 @@
 //! `jacoflow.scenes`: moving pictures with exact truth.
 
 use super::arrays::{self, ColourRule};
-use super::{field::FlowField, options::Integer, options::count};
+use super::{field::FlowField, options::Integer, options::count, options::named};
 use crate::errors::Outcome;
+use crate::interrupt::interruptible;
 use crate::keywords::getters;
 use jacoflow::error::Error;
 use jacoflow::parallel::Threads;
@@ -55,8 +56,8 @@ impl Scene {
         name: String,
         width: Option<Integer>,
         height: Option<Integer>,
-        origin: Option<(f64, f64)>,
-        random_state: Option<u64>,
+        #[pyo3(from_py_with = named::origin)] origin: Option<(f64, f64)>,
+        #[pyo3(from_py_with = named::random_state)] random_state: Option<u64>,
         carrier: Option<String>,
         parameters: Option<&Bound<'_, PyDict>>,
     ) -> Outcome<Self> {
@@ -84,16 +85,21 @@ impl Scene {
 
     /// The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded
     /// nor clipped.
-    fn frame<'py>(&self, py: Python<'py>, t: f64) -> Outcome<Bound<'py, PyAny>> {
+    fn frame<'py>(&self, py: Python<'py>, #[pyo3(from_py_with = named::t)] t: f64) -> Outcome<Bound<'py, PyAny>> {
         self.expect_room(1)?;
         let threads = Threads::new(None)?;
-        let frame = py.detach(|| threads.install(|| self.core.frame(t)));
+        let frame = interruptible(py, || Ok(threads.install(|| self.core.frame(t))))?;
         arrays::from_frame(py, frame)
     }
 
     /// Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit scale.
     #[pyo3(signature = (count, start=0.0))]
-    fn frames<'py>(&self, py: Python<'py>, count: Integer, start: f64) -> Outcome<Bound<'py, PyAny>> {
+    fn frames<'py>(
+        &self,
+        py: Python<'py>,
+        count: Integer,
+        #[pyo3(from_py_with = named::start)] start: f64,
+    ) -> Outcome<Bound<'py, PyAny>> {
         let wrong = |_| Error::argument("count", "zero or a positive integer", count.0);
         let count = usize::try_from(count.0).map_err(wrong)?;
         let (width, height) = self.core.size();
@@ -101,7 +107,7 @@ impl Scene {
         let mut data = self.expect_room(count)?;
         for index in 0..count {
             py.check_signals()?;
-            let frame = py.detach(|| threads.install(|| self.core.frame(start + index as f64)));
+            let frame = interruptible(py, || Ok(threads.install(|| self.core.frame(start + index as f64))))?;
             data.extend(frame.into_data());
         }
         arrays::owned(py, &[count, height, width], data)
@@ -115,7 +121,12 @@ impl Scene {
     /// the next frame, (-1, 1) the mean of those since the last and to the next. Status MASKED and NaN where
     /// the scene has no single truth.
     #[pyo3(signature = (t, *, between=None))]
-    fn truth(&self, py: Python<'_>, t: f64, between: Option<(f64, f64)>) -> Outcome<FlowField> {
+    fn truth(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = named::t)] t: f64,
+        #[pyo3(from_py_with = named::between)] between: Option<(f64, f64)>,
+    ) -> Outcome<FlowField> {
         let threads = Threads::new(None)?;
         let scene = self.core.as_ref();
         let field = py.detach(|| {
@@ -129,7 +140,13 @@ impl Scene {
 
     /// Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame,
     /// array (6,); None without truth.
-    fn motion<'py>(&self, py: Python<'py>, x: f64, y: f64, t: f64) -> Outcome<Option<Bound<'py, PyAny>>> {
+    fn motion<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = named::x)] x: f64,
+        #[pyo3(from_py_with = named::y)] y: f64,
+        #[pyo3(from_py_with = named::t)] t: f64,
+    ) -> Outcome<Option<Bound<'py, PyAny>>> {
         let motion = self.core.motion(x, y, t);
         motion.map(|m| arrays::owned(py, &[6], m.to_array().to_vec())).transpose()
     }
@@ -139,7 +156,13 @@ impl Scene {
     ///
     /// It differs from `duration` times the velocity wherever paths are curved.
     #[pyo3(signature = (x, y, t, duration=1.0))]
-    fn displacement(&self, x: f64, y: f64, t: f64, duration: f64) -> Option<(f64, f64)> {
+    fn displacement(
+        &self,
+        #[pyo3(from_py_with = named::x)] x: f64,
+        #[pyo3(from_py_with = named::y)] y: f64,
+        #[pyo3(from_py_with = named::t)] t: f64,
+        #[pyo3(from_py_with = named::duration)] duration: f64,
+    ) -> Option<(f64, f64)> {
         self.core.displacement(x, y, t, duration)
     }
 
@@ -186,10 +209,10 @@ impl Sensor {
     #[new]
     #[pyo3(signature = (*, noise=None, rounding=None, saturate=None, random_state=None))]
     fn new(
-        noise: Option<f64>,
+        #[pyo3(from_py_with = named::noise)] noise: Option<f64>,
         rounding: Option<&str>,
         saturate: Option<bool>,
-        random_state: Option<u64>,
+        #[pyo3(from_py_with = named::random_state)] random_state: Option<u64>,
     ) -> Outcome<Self> {
         let default = CoreSensor::default();
         let sensor = CoreSensor {
@@ -215,7 +238,11 @@ impl Sensor {
     ///
     /// The noise depends on the seed, `index` (which frame it is) and the pixel, on nothing else.
     #[pyo3(signature = (frame, index=0))]
-    fn apply<'py>(&self, frame: &Bound<'py, PyAny>, index: u64) -> Outcome<Bound<'py, PyAny>> {
+    fn apply<'py>(
+        &self,
+        frame: &Bound<'py, PyAny>,
+        #[pyo3(from_py_with = named::index)] index: u64,
+    ) -> Outcome<Bound<'py, PyAny>> {
         let py = frame.py();
         let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
         let seen = py.detach(|| self.sensor.apply(&frame.to_real(), index));
@@ -225,7 +252,11 @@ impl Sensor {
     /// As `apply`, as a uint8 array (H, W) of grey levels; fractions are cut off and values outside 0 ... 255
     /// clipped.
     #[pyo3(signature = (frame, index=0))]
-    fn apply_u8<'py>(&self, frame: &Bound<'py, PyAny>, index: u64) -> Outcome<Bound<'py, PyAny>> {
+    fn apply_u8<'py>(
+        &self,
+        frame: &Bound<'py, PyAny>,
+        #[pyo3(from_py_with = named::index)] index: u64,
+    ) -> Outcome<Bound<'py, PyAny>> {
         let py = frame.py();
         let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
         let seen = py.detach(|| self.sensor.apply_u8(&frame.to_real(), index));

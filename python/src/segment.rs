@@ -1,9 +1,10 @@
 //! Graph segmentation for Python; what a user meets is `jacoflow.segment`.
 
-use super::arrays;
+use super::{arrays, samples::exact_samples};
 use crate::errors::Outcome;
+use crate::interrupt::interruptible;
 use crate::options::{self, Integer};
-use jacoflow::error::{Error, Result};
+use jacoflow::error::{Error, Result, shape_text};
 use jacoflow::parallel::Threads;
 use jacoflow::segment::{EdgeWeight, SegmentImage, SegmentOptions, felzenszwalb, region_means};
 use jacoflow::types::{Frame, Sample};
@@ -56,17 +57,19 @@ pub fn segment_felzenszwalb<'py>(
         .map_err(|_| Error::argument("min_size", "a number of pixels, at least 0", min_size))?;
     let options = SegmentOptions { scale, sigma, min_size };
     let array = arrays::as_array("image", image)?;
+    arrays::check_size("image", &array)?;
+    let array = exact_samples("image", array)?;
     let shape = array.shape().to_vec();
     let (size, channels) = match shape[..] {
         [height, width] => ((width, height), 1),
         [height, width, channels @ (1 | 3)] => ((width, height), channels),
-        _ => return Err(Error::argument("image", "shape (H, W) or (H, W, 3)", format!("{shape:?}")).into()),
+        _ => return Err(Error::argument("image", "shape (H, W) or (H, W, 3)", shape_text(&shape)).into()),
     };
     macro_rules! of {
         ($($sample:ty),*) => {$(
             if let Some(samples) = arrays::elements::<$sample>(&array) {
                 let image = Interleaved { size, channels, samples: &samples };
-                return wrap(py, size, py.detach(|| labels(&image, &options, threads))?);
+                return wrap(py, size, interruptible(py, || labels(&image, &options, threads))?);
             }
         )*};
     }
@@ -90,14 +93,15 @@ fn wrap(py: Python<'_>, (width, height): (usize, usize), labels: Vec<i32>) -> Ou
 pub fn segment_region_means<'py>(labels: &Bound<'py, PyAny>, values: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyAny>> {
     let py = labels.py();
     let array = arrays::as_array("labels", labels)?;
+    arrays::check_size("labels", &array)?;
     let shape = array.shape().to_vec();
     let (value_shape, values) = arrays::doubles("values", values)?;
     let channels = match value_shape[..] {
         _ if value_shape == shape => 1,
         [height, width, channels] if shape == [height, width] => channels,
         _ => {
-            let expected = format!("shape {shape:?} as labels, or that and channels");
-            return Err(Error::argument("values", expected, format!("{value_shape:?}")).into());
+            let expected = format!("shape {} as labels, or that and channels", shape_text(&shape));
+            return Err(Error::argument("values", expected, shape_text(&value_shape)).into());
         }
     };
     let wide = arrays::elements::<i64>(&array).ok_or_else(|| arrays::wrong_dtype("labels", &array))?;
@@ -105,7 +109,7 @@ pub fn segment_region_means<'py>(labels: &Bound<'py, PyAny>, values: &Bound<'py,
         return Err(Error::argument("labels", format!("0 to {MAX_LABEL}"), wrong).into());
     }
     let count = wide.iter().max().map_or(0, |&label| label as usize + 1);
-    let means = py.detach(|| {
+    let means = interruptible(py, || {
         let labels: Vec<i32> = wide.into_iter().map(|label| label as i32).collect();
         region_means(&labels, count, &values, channels)
     })?;

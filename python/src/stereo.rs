@@ -2,7 +2,8 @@
 
 use super::arrays::{self, ColourRule};
 use crate::errors::Outcome;
-use crate::options::{self, Integer};
+use crate::interrupt::{abandonable, interruptible};
+use crate::options::{self, Integer, named};
 use jacoflow::error::{Error, Result};
 use jacoflow::io::{DisparityFormat, DisparityMap};
 use jacoflow::stereo::{self, EdgeDisparityOptions, EdgeMap, EdgeSettings, Method, RowOffset};
@@ -38,7 +39,9 @@ struct Search {
     row_range: (i32, i32),
     blur_sigma: f64,
     threshold: f64,
+    #[pyo3(from_py_with = named::classes)]
     classes: usize,
+    #[pyo3(from_py_with = named::window)]
     window: usize,
     min_support: f64,
     threads: Option<Integer>,
@@ -53,6 +56,7 @@ struct Matching<'py> {
     subpixel: bool,
     left_right_check: bool,
     prior: Option<Bound<'py, PyAny>>,
+    #[pyo3(from_py_with = named::prior_radius)]
     prior_radius: u32,
 }
 
@@ -104,7 +108,7 @@ pub fn edge_disparity<'py>(
     let (search, matching): (Search, Matching<'_>) = (options.extract()?, options.extract()?);
     let options = matching.add_to(search.options()?)?;
     let [left, right] = grey_levels([("left", left), ("right", right)])?;
-    let found = py.detach(|| stereo::edge_disparity(&left, &right, &options))?;
+    let found = interruptible(py, || stereo::edge_disparity(&left, &right, &options))?;
     let count = [found.rows.len()];
     Ok((
         arrays::from_frame(py, found.disparity)?,
@@ -126,7 +130,7 @@ pub fn estimate_row_offset(
     let options = options.extract::<Search>()?.options()?;
     let py = left.py();
     let [left, right] = grey_levels([("left", left), ("right", right)])?;
-    let RowOffset { rows, doubtful } = py.detach(|| stereo::find_row_offset(&left, &right, &options))?;
+    let RowOffset { rows, doubtful } = interruptible(py, || stereo::find_row_offset(&left, &right, &options))?;
     Ok((rows, doubtful))
 }
 
@@ -144,7 +148,7 @@ pub fn edge_pixels<'py>(
     options.check()?;
     let [view] = grey_levels([("view", view)])?;
     let settings = EdgeSettings { blur_sigma, threshold, classes: options.classes };
-    let map = py.detach(|| threads.install(|| EdgeMap::new(&view, &settings)));
+    let map = interruptible(py, || Ok(threads.install(|| EdgeMap::new(&view, &settings))))?;
     let count = [map.len()];
     Ok((arrays::owned(py, &count, map.rows)?, arrays::owned(py, &count, map.columns)?))
 }
@@ -159,7 +163,7 @@ fn format_of(path: &Path) -> Result<DisparityFormat> {
 #[pyfunction(name = "_read_disparity")]
 pub fn read_disparity(py: Python<'_>, path: PathBuf) -> Outcome<Bound<'_, PyAny>> {
     let format = format_of(&path)?;
-    arrays::from_frame(py, py.detach(|| format.read(&path))?.disparity)
+    arrays::from_frame(py, abandonable(py, move || format.read(&path))?.disparity)
 }
 
 /// The compiled part of `jacoflow.io.write_disparity`: how many disparities the format could not hold.

@@ -7,29 +7,23 @@ use self::options::Given;
 use super::arrays::{self, ColourRule};
 use super::stereo::in_levels;
 use crate::errors::Outcome;
+use crate::interrupt::Held;
 use jacoflow::error::Error;
 use jacoflow::track::GreyLevels;
 use jacoflow::track::stereo::{EdgePoints, Node, Step, StereoTracker, TrackGraph};
 use jacoflow::types::{AnyFrame, Frame};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyList};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use pyo3::types::{PyBytes, PyDict, PyList};
 
 /// The compiled part of `jacoflow.track.StereoTracker`.
 #[pyclass(name = "_StereoTracker", module = "jacoflow._jacoflow", frozen)]
-pub struct PyStereoTracker(Mutex<Tracking>);
+pub struct PyStereoTracker(Held<Tracking>);
 
 struct Tracking {
     tracker: StereoTracker,
     /// Decided by the first views, unless they are too dark to.
     levels: Option<GreyLevels>,
-}
-
-impl PyStereoTracker {
-    fn lock(&self) -> MutexGuard<'_, Tracking> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
 }
 
 impl Tracking {
@@ -57,7 +51,7 @@ impl PyStereoTracker {
     #[new]
     fn new(options: &Bound<'_, PyDict>) -> Outcome<Self> {
         let options = options.extract::<Given>()?.options()?;
-        Ok(Self(Mutex::new(Tracking { tracker: StereoTracker::new(options)?, levels: None })))
+        Ok(Self(Held::new(Tracking { tracker: StereoTracker::new(options)?, levels: None })))
     }
 
     /// The next step from both views, `dt` after the last one, as a dictionary.
@@ -72,8 +66,9 @@ impl PyStereoTracker {
             arrays::frame("left", left, ColourRule::Luminance)?,
             arrays::frame("right", right, ColourRule::Luminance)?,
         ];
-        let step =
-            py.detach(|| self.lock().step(&views, dt, |tracker, [left, right]| tracker.update(&left, &right)))?;
+        let step = self
+            .0
+            .change(py, |tracking| tracking.step(&views, dt, |tracker, [left, right]| tracker.update(&left, &right)))?;
         step_dict(py, step)
     }
 
@@ -100,25 +95,26 @@ impl PyStereoTracker {
             return Err(Error::argument("disparity", expected, shape(disparity.size())).into());
         }
         let points = EdgePoints::from_map(&disparity);
-        let step =
-            py.detach(|| self.lock().step(&[left], dt, |tracker, [left]| tracker.update_edges(&left, points)))?;
+        let step = self
+            .0
+            .change(py, |tracking| tracking.step(&[left], dt, |tracker, [left]| tracker.update_edges(&left, points)))?;
         step_dict(py, step)
     }
 
     /// How many rows lower the right view shows a point, where that is known.
-    fn row_offset(&self) -> Option<f64> {
-        self.lock().tracker.row_offset()
+    fn row_offset(&self, py: Python<'_>) -> Outcome<Option<f64>> {
+        self.0.with(py, |tracking| tracking.tracker.row_offset())
     }
 
     /// Clusters of all steps so far and their arcs.
-    fn graph(&self) -> PyTrackGraph {
-        PyTrackGraph(self.lock().tracker.graph().clone())
+    fn graph(&self, py: Python<'_>) -> Outcome<PyTrackGraph> {
+        Ok(PyTrackGraph(self.0.with(py, |tracking| tracking.tracker.graph().clone())?))
     }
 
     /// Tracks by id: times (T,), positions (T, 3), velocities (T, 3) and when that was (T,).
     fn tracks<'py>(&self, py: Python<'py>) -> Outcome<Bound<'py, PyDict>> {
         let out = PyDict::new(py);
-        for (id, track) in self.lock().tracker.tracks() {
+        for (id, track) in &self.0.with(py, |tracking| tracking.tracker.tracks().clone())? {
             let count = track.times.len();
             let times = track.times.iter().map(|&time| time as i64).collect();
             let flat = |values: &[[f64; 3]]| values.iter().flatten().copied().collect();
@@ -132,6 +128,22 @@ impl PyStereoTracker {
         }
         Ok(out)
     }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Outcome<(Bound<'py, PyAny>, (Bound<'py, PyBytes>, Option<f64>))> {
+        let py = slf.py();
+        let saved = |this: &mut Tracking| (this.tracker.to_bytes(), this.levels.map(GreyLevels::float_gain));
+        let (bytes, gain) = slf.get().0.with(py, saved)?;
+        let restore = py.import("jacoflow._jacoflow")?.getattr("_restore_stereo_tracker")?;
+        Ok((restore, (PyBytes::new(py, &bytes), gain)))
+    }
+}
+
+/// The inverse of `_StereoTracker.__reduce__`.
+#[pyfunction(name = "_restore_stereo_tracker")]
+#[pyo3(signature = (state, gain))]
+pub fn restore_stereo_tracker(py: Python<'_>, state: &[u8], gain: Option<f64>) -> Outcome<PyStereoTracker> {
+    let tracker = py.detach(|| StereoTracker::from_bytes(state))?;
+    Ok(PyStereoTracker(Held::new(Tracking { tracker, levels: gain.map(GreyLevels::of_floats) })))
 }
 
 /// Numbers that may be missing, as an array with NaN for them.

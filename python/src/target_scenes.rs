@@ -1,6 +1,6 @@
 //! `jacoflow.scenes.TargetScene`: colour scenes of targets that look alike, with exact boxes.
 
-use super::{arrays, options::Integer, scenes::hash};
+use super::{arrays, options::Integer, options::named, scenes::hash};
 use crate::errors::Outcome;
 use crate::keywords::getters;
 use jacoflow::error::Error;
@@ -9,6 +9,9 @@ use jacoflow::synth::targets::{SCENES, TargetScene as CoreScene, TargetSceneOpti
 use pyo3::exceptions::PyMemoryError;
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict, PyTuple};
+
+/// Most indices in a list of targets.
+const MAX_LISTED: usize = 1 << 16;
 
 /// A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with
 /// exact boxes.
@@ -33,11 +36,16 @@ impl TargetScene {
     }
 
     /// Which targets are drawn; all without a list.
-    fn drawn(&self, targets: Option<Vec<Integer>>) -> Outcome<Vec<bool>> {
+    fn drawn(&self, targets: Option<Bound<'_, PyAny>>) -> Outcome<Vec<bool>> {
         let count = self.core.target_count();
         let Some(targets) = targets else { return Ok(vec![true; count]) };
         let mut drawn = vec![false; count];
-        for Integer(target) in targets {
+        let length = targets.len()?;
+        if length > MAX_LISTED {
+            return Err(Error::argument("targets", format!("indices, at most {MAX_LISTED}"), length).into());
+        }
+        for target in targets.try_iter()? {
+            let Integer(target) = target?.extract()?;
             let expected = || Error::argument("targets", format!("indices from 0 to {}", count - 1), target);
             *usize::try_from(target).ok().and_then(|k| drawn.get_mut(k)).ok_or_else(expected)? = true;
         }
@@ -64,11 +72,11 @@ impl TargetScene {
     fn new(
         py: Python<'_>,
         name: &str,
-        random_state: u64,
-        scale: f64,
-        noise: f64,
+        #[pyo3(from_py_with = named::random_state)] random_state: u64,
+        #[pyo3(from_py_with = named::scale)] scale: f64,
+        #[pyo3(from_py_with = named::noise)] noise: f64,
         frames: Option<Integer>,
-        colour_cast: f64,
+        #[pyo3(from_py_with = named::colour_cast)] colour_cast: f64,
     ) -> Outcome<Self> {
         let count = |Integer(count): Integer| {
             usize::try_from(count).map_err(|_| Error::argument("frames", "a positive integer", count))
@@ -90,7 +98,12 @@ impl TargetScene {
     /// With `targets`, indices, only those are drawn; world, post and noise are the same, so that the
     /// difference shows the pixels of the others.
     #[pyo3(signature = (t, *, targets=None))]
-    fn frame<'py>(&self, py: Python<'py>, t: Integer, targets: Option<Vec<Integer>>) -> Outcome<Bound<'py, PyAny>> {
+    fn frame<'py>(
+        &self,
+        py: Python<'py>,
+        t: Integer,
+        targets: Option<Bound<'py, PyAny>>,
+    ) -> Outcome<Bound<'py, PyAny>> {
         let (t, drawn, threads) = (self.index(t)?, self.drawn(targets)?, Threads::new(None)?);
         let frame = py.detach(|| threads.install(|| self.core.frame_with(t, |target| drawn[target])));
         let (width, height) = frame.size();

@@ -2,17 +2,17 @@
 
 use super::arrays::{self, ColourRule};
 use crate::errors::Outcome;
+use crate::interrupt::{Held, interruptible};
 use jacoflow::error::{Error, Result};
 use jacoflow::track::gradient::{CameraMotion, GradientOptions, MovingTarget, Shape, Start, detect_moving_target};
 use jacoflow::track::{GradientTracker, GreyLevels, Tracker};
 use jacoflow::types::{Frame, TargetBox, TrackState};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
-use std::sync::{Mutex, PoisonError};
+use pyo3::types::{PyBytes, PyDict};
 
 /// The compiled part of `jacoflow.track.GradientTracker`.
 #[pyclass(name = "_GradientTracker", module = "jacoflow._jacoflow", frozen)]
-pub struct PyGradientTracker(pub(super) Mutex<Following>);
+pub struct PyGradientTracker(pub(super) Held<Following>);
 
 pub(super) struct Following {
     pub(super) tracker: GradientTracker,
@@ -42,8 +42,8 @@ pub(super) fn begin(
     };
     let frame_of = arrays::frame("frame", frame, ColourRule::Refuse)?;
     let levels = GreyLevels::decide(&frame_of);
-    let tracker = frame.py().detach(|| method(&levels.convert(&frame_of), start))?;
-    Ok(PyGradientTracker(Mutex::new(Following { tracker, levels })))
+    let tracker = interruptible(frame.py(), || method(&levels.convert(&frame_of), start))?;
+    Ok(PyGradientTracker(Held::new(Following { tracker, levels })))
 }
 
 /// What the camera may do.
@@ -73,8 +73,7 @@ impl PyGradientTracker {
     fn update<'py>(&self, frame: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyDict>> {
         let py = frame.py();
         let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
-        let state = py.detach(|| {
-            let mut following = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let state = self.0.change(py, |following| {
             let levels = following.levels.revised(std::slice::from_ref(&frame));
             let state = following.tracker.update(&levels.convert(&frame))?;
             following.levels = levels;
@@ -85,8 +84,23 @@ impl PyGradientTracker {
 
     /// The target at the last frame, as a dictionary.
     fn state<'py>(&self, py: Python<'py>) -> Outcome<Bound<'py, PyDict>> {
-        to_dict(py, self.0.lock().unwrap_or_else(PoisonError::into_inner).tracker.state())
+        to_dict(py, &self.0.with(py, |following| following.tracker.state().clone())?)
     }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Outcome<(Bound<'py, PyAny>, (Bound<'py, PyBytes>, f64))> {
+        let py = slf.py();
+        let saved = |following: &mut Following| (following.tracker.to_bytes(), following.levels.float_gain());
+        let (bytes, gain) = slf.get().0.with(py, saved)?;
+        let restore = py.import("jacoflow._jacoflow")?.getattr("_restore_gradient_tracker")?;
+        Ok((restore, (PyBytes::new(py, &bytes), gain)))
+    }
+}
+
+/// The inverse of `_GradientTracker.__reduce__`.
+#[pyfunction(name = "_restore_gradient_tracker")]
+pub fn restore_gradient_tracker(py: Python<'_>, state: &[u8], gain: f64) -> Outcome<PyGradientTracker> {
+    let tracker = py.detach(|| GradientTracker::from_bytes(state))?;
+    Ok(PyGradientTracker(Held::new(Following { tracker, levels: GreyLevels::of_floats(gain) })))
 }
 
 /// A state by the names of `jacoflow.track.TrackResult`.
@@ -120,7 +134,7 @@ fn to_dict<'py>(py: Python<'py>, state: &TrackState) -> Outcome<Bound<'py, PyDic
     out.set_item("rotation_observable", state.rotation_observable)?;
     out.set_item("reacquired", state.reacquired)?;
     out.set_item("status", state.status.name())?;
-    out.set_item("reason", state.reason)?;
+    out.set_item("reason", &*state.reason)?;
     out.set_item("frame", state.frame)?;
     Ok(out)
 }
@@ -140,7 +154,7 @@ pub fn detect(
         let expected = format!("a point (x, y) in the {width} x {height} frames");
         return Err(Error::argument("center", expected, format!("({x}, {y})")).into());
     }
-    let found = py.detach(|| detect_moving_target(&first, &second, center));
+    let found = interruptible(py, || Ok(detect_moving_target(&first, &second, center)))?;
     Ok(found.map(|MovingTarget { bounds: TargetBox { x, y, width, height }, displacement }| {
         ([x, y, width, height], displacement)
     }))

@@ -5,7 +5,7 @@ use super::arguments::{
 };
 use super::flow::{Prepared, prepare_with_covariance};
 use super::interrupt::Watch;
-use super::open::{compute, open_input};
+use super::open::{compute, open_input, refuse_inputs};
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow, table_target};
 use crate::error::{Error, Result};
@@ -92,10 +92,18 @@ pub struct EgomotionCommand {
 impl EgomotionCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
+        let outputs = [
+            ("output", &self.output),
+            ("alternatives", &self.alternatives),
+            ("picture", &self.picture),
+            ("maps", &self.maps),
+        ];
+        let outputs = outputs.map(|(option, path)| (option, path.as_deref()));
+        refuse_inputs(self.input.input.iter().map(Path::new), &outputs, self.force)?;
         let plan = self.plan()?;
-        let opened = open_input(&self.input)?;
+        let mut opened = open_input(&self.input)?;
         let Prepared { plan: stream, is_double, .. } = prepare_with_covariance(
-            &opened,
+            &mut opened,
             &self.input,
             &self.method,
             &self.seen(),

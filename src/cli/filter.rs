@@ -12,7 +12,7 @@ use super::run::{ReportContext, input_details, report, run_pipeline};
 use crate::error::{Error, Result};
 use crate::image::Preprocess;
 use crate::io::Element;
-use crate::pipeline::{FilterStage, OutputPlan, Pipeline, check_target};
+use crate::pipeline::{FilterStage, OutputPlan, Pipeline, check_target, is_folder};
 use crate::simd::SimdReal;
 use crate::temporal::{FlowFilter, FlowFilterOptions};
 use crate::types::Precision;
@@ -58,10 +58,11 @@ impl FilterCommand {
         if let (Some(_), Some(name)) = (&self.resume, self.filter.given()) {
             return Err(Error::argument(name, "no such option with --resume, whose state has its own", "one"));
         }
-        let opened = open_input(&self.input)?;
-        let options = self.options(&opened)?;
+        self.output.refuse_inputs(&self.input.input)?;
+        let mut opened = open_input(&self.input)?;
+        let options = self.options(&mut opened)?;
         let steps = preprocess(&self.input, options.mask.as_ref())?;
-        if let Some(path) = &self.save_state {
+        if let Some(path) = self.save_state.as_ref().filter(|path| !self.is_in_new_folder(path)) {
             check_target(path, self.output.force || self.resume.as_ref() == Some(path))?;
         }
         if let Some(path) = &self.resume {
@@ -73,6 +74,12 @@ impl FilterCommand {
         } else {
             self.run(opened, FilterStage::<f32>::new(options, steps), watch)
         }
+    }
+
+    /// Whether a file is to lie in the folder of the results, which is made before anything is written.
+    fn is_in_new_folder(&self, path: &Path) -> bool {
+        let folder = self.output.output.as_deref().filter(|folder| is_folder(folder) && !folder.exists());
+        folder.is_some_and(|folder| path.parent() == Some(folder))
     }
 
     /// Goes on with a saved filter, in the precision that it was saved in.
@@ -98,12 +105,16 @@ impl FilterCommand {
         }
     }
 
-    fn options(&self, opened: &Opened) -> Result<FlowFilterOptions> {
+    fn options(&self, opened: &mut Opened) -> Result<FlowFilterOptions> {
         let mut options = self.filter.options(opened.first.dtype)?;
+        if self.resume.is_some() {
+            // The saved state has its own.
+            opened.pixel_size = None;
+        }
+        options.units = opened.units(&self.filter.units);
         options.sites = self.grid.sampling_grid()?;
         options.sites.shape(opened.first.size)?;
         options.mask = read_mask(self.grid.mask.as_deref(), opened.first.size)?;
-        options.units = self.filter.units.units(opened.numbering.period());
         (options.threads, options.simd) = compute(&self.compute)?;
         Ok(options)
     }

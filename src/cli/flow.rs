@@ -9,7 +9,7 @@ use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow};
 use crate::error::{Error, Result};
 use crate::flow::{Estimator, EstimatorOptions};
-use crate::pipeline::{OutputPlan, OutputWish, TableTarget};
+use crate::pipeline::{OutputPlan, OutputWish, TableTarget, is_folder};
 use crate::temporal::StreamPlan;
 use crate::types::SamplingGrid;
 use clap::Args;
@@ -55,7 +55,7 @@ pub struct Prepared {
 
 /// Builds the estimator that the arguments ask for.
 pub fn prepare(
-    opened: &Opened,
+    opened: &mut Opened,
     input: &InputArguments,
     method: &MethodArguments,
     grid: &GridArguments,
@@ -70,7 +70,7 @@ pub fn prepare(
         sites: places,
         mask: read_mask(grid.mask.as_deref(), opened.first.size)?,
         initial: method.initial.as_deref().map(read_initial).transpose()?,
-        units: method.units.units(opened.numbering.period()),
+        units: opened.units(&method.units),
         covariance: !method.no_covariance && chosen.info().has_covariance,
         systematic: recursive.is_some(),
         diagnostics: false,
@@ -83,13 +83,19 @@ pub fn prepare(
     description["smooth"] = json!(input.smooth);
     description["input"] = json!(opened.name);
     let steps = preprocess(input, common.mask.as_ref())?;
-    let plan = StreamPlan::new(Estimator::new(chosen, common)?, steps, recursive)?;
+    let mut plan = StreamPlan::new(Estimator::new(chosen, common)?, steps, recursive)?;
+    if method.pairs {
+        plan = plan.of_pairs()?;
+        if let Some(odd) = opened.frames.filter(|count| count % 2 == 1) {
+            return Err(Error::argument("frames", "an even number, in pairs", odd));
+        }
+    }
     Ok(Prepared { plan, is_double: in_double(compute_arguments.precision, &opened.first, false), description })
 }
 
 /// As [`prepare`], with the covariance that `purpose` needs.
 pub fn prepare_with_covariance(
-    opened: &Opened,
+    opened: &mut Opened,
     input: &InputArguments,
     method: &MethodArguments,
     grid: &GridArguments,
@@ -118,9 +124,11 @@ pub fn plan_output(
     let standard_output = points && output.output.is_none() && !json;
     let path = if standard_output { Some(Path::new("-")) } else { output.output.as_deref() };
     let csv = vec!["csv".to_string()];
+    // The name of a file says its format.
+    let is_file = path.is_some_and(|path| path != Path::new("-") && !is_folder(path));
     let plan = OutputPlan::decide(&OutputWish {
         path,
-        formats: if points && output.format.is_empty() { &csv } else { &output.format },
+        formats: if points && output.format.is_empty() && !is_file { &csv } else { &output.format },
         pictures: &output.picture,
         replace: output.force,
         fields,
@@ -146,11 +154,13 @@ pub fn expect_output(plan: &OutputPlan, json: bool, has_other: bool) -> Result<(
 impl FlowCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
-        let opened = open_input(&self.input)?;
+        self.output.refuse_inputs(&self.input.input)?;
+        let mut opened = open_input(&self.input)?;
         let Prepared { plan: stream, is_double, description } =
-            prepare(&opened, &self.input, &self.method, &self.grid, &self.compute)?;
+            prepare(&mut opened, &self.input, &self.method, &self.grid, &self.compute)?;
         let estimator = stream.estimator();
-        let fields = opened.frames.map(|frames| (frames + 1).saturating_sub(estimator.frames_needed()));
+        let count = |frames: usize| (frames + 1).saturating_sub(estimator.frames_needed());
+        let fields = opened.frames.map(|frames| if self.method.pairs { frames / 2 } else { count(frames) });
         let plan = plan_output(&self.output, &estimator.options().sites, self.messages.json, fields)?;
         expect_output(&plan, self.messages.json, false)?;
         plan.check_parameters(estimator.model().parameters().iter().map(|parameter| parameter.name))?;

@@ -1,10 +1,11 @@
 //! `jacoflow info`: what a recording or a result file holds.
 
-use super::arguments::MessageArguments;
+use super::arguments::{MessageArguments, PlaneArguments};
 use super::interrupt::Watch;
 use super::open::open_source;
 use super::progress::Bar;
 use super::report::{Report, print};
+use super::run::pixel_size;
 use crate::error::{Error, Result};
 use crate::io::npz::NpzReader;
 use crate::io::{FlowImage, FrameSource, OpenOptions, read_flo, read_kitti, read_npz, read_pfm};
@@ -30,6 +31,8 @@ pub struct InfoCommand {
     #[arg(required = true, value_name = "INPUT")]
     pub input: Vec<String>,
     #[command(flatten)]
+    pub planes: PlaneArguments,
+    #[command(flatten)]
     pub messages: MessageArguments,
 }
 
@@ -50,9 +53,11 @@ impl InfoCommand {
     }
 
     fn recording(&self, watch: &Watch) -> Result<Value> {
-        let options = OpenOptions { colour: crate::io::Colour::Luminance, ..OpenOptions::default() };
+        let planes = self.planes.selection();
+        let options = OpenOptions { colour: crate::io::Colour::Luminance, planes, ..OpenOptions::default() };
         let mut source = open_source(&self.input, &options)?;
         let (name, hint, rate) = (source.describe(), source.len_hint(), source.frame_rate());
+        let size = source.pixel_size();
         let first = source.next_frame()?;
         let first = first.ok_or_else(|| Error::argument("input", "at least one frame", format!("none in {name}")))?;
         let frames = match hint {
@@ -62,13 +67,20 @@ impl InfoCommand {
         let (width, height) = first.size();
         Ok(json!({
             "command": "info", "kind": "recording", "input": name, "frames": frames, "width": width, "height": height,
-            "dtype": first.dtype(), "fps": rate, "first_frame": statistics(samples(&first).into_iter()),
+            "dtype": first.dtype(), "fps": rate, "pixel_size": size.as_ref().map(pixel_size),
+            "first_frame": frame_statistics(&first),
         }))
     }
 }
 
-fn samples(frame: &AnyFrame) -> Vec<f64> {
-    frame.to_real::<f64>().into_data()
+/// Statistics of the samples, which are not copied: they may be as many as memory holds.
+fn frame_statistics(frame: &AnyFrame) -> Value {
+    match frame {
+        AnyFrame::U8(frame) => statistics(frame.data().iter().map(|&sample| f64::from(sample))),
+        AnyFrame::U16(frame) => statistics(frame.data().iter().map(|&sample| f64::from(sample))),
+        AnyFrame::F32(frame) => statistics(frame.data().iter().map(|&sample| f64::from(sample))),
+        AnyFrame::F64(frame) => statistics(frame.data().iter().copied()),
+    }
 }
 
 fn count(source: &mut dyn FrameSource, bar: &Bar<'_>) -> Result<usize> {
@@ -105,7 +117,7 @@ fn result_info(path: &Path) -> Option<Result<Value>> {
         "flo" => Some(read_flo(path).map(|flow| flow_image_info(path, "flo", &flow))),
         "pfm" => Some(read_pfm(path).map(|map| {
             let names: &[&str] = if map.planes.len() == 1 { &["value"] } else { &["u", "v", "third"] };
-            let planes = names.iter().zip(&map.planes).map(|(name, plane)| (*name, wide(plane)));
+            let planes = names.iter().zip(&map.planes).map(|(name, plane)| (*name, &plane[..]));
             planes_info(path, "pfm", (map.width, map.height), planes)
         })),
         "npz" => Some(npz_info(path)),
@@ -122,23 +134,19 @@ fn is_kitti(path: &Path) -> bool {
     info.color_type == png::ColorType::Rgb && info.bit_depth == png::BitDepth::Sixteen
 }
 
-fn wide(plane: &[f32]) -> Vec<f64> {
-    plane.iter().map(|value| f64::from(*value)).collect()
-}
-
 fn flow_image_info(path: &Path, format: &str, flow: &FlowImage) -> Value {
-    let planes = [("u", wide(flow.u())), ("v", wide(flow.v()))];
+    let planes = [("u", flow.u()), ("v", flow.v())];
     planes_info(path, format, (flow.width(), flow.height()), planes.into_iter())
 }
 
-fn planes_info<'a>(
+fn planes_info<'a, T: Copy + Into<f64> + 'a>(
     path: &Path,
     format: &str,
     (width, height): (usize, usize),
-    planes: impl Iterator<Item = (&'a str, Vec<f64>)>,
+    planes: impl Iterator<Item = (&'a str, &'a [T])>,
 ) -> Value {
     let planes: Map<String, Value> =
-        planes.map(|(name, values)| (name.to_string(), statistics(values.into_iter()))).collect();
+        planes.map(|(name, values)| (name.to_string(), statistics(values.iter().map(|&value| value.into())))).collect();
     let share = planes.get("u").or(planes.get("value")).map(|plane| plane["known_share"].clone());
     json!({
         "command": "info", "kind": "result", "input": path, "format": format, "width": width, "height": height,
@@ -165,7 +173,7 @@ fn npz_info(path: &Path) -> Result<Value> {
     }
     let stored = read_npz::<f64>(path)?;
     let field = &stored.field;
-    let planes = field.layout.parameters.iter().map(|name| (name.as_str(), field.plane(name).unwrap_or(&[]).to_vec()));
+    let planes = field.layout.parameters.iter().map(|name| (name.as_str(), field.plane(name).unwrap_or(&[])));
     let mut info = planes_info(path, "npz", (field.width, field.height), planes);
     let valid = field.status.iter().filter(|status| status.is_valid()).count();
     info["valid_share"] = json!(valid as f64 / field.len().max(1) as f64);
@@ -210,6 +218,10 @@ fn in_words(summary: &Value) -> String {
             Value::String(value) => lines.push(format!("{:<14}{value}", name.replace('_', " "))),
             value => lines.push(format!("{:<14}{value}", name.replace('_', " "))),
         }
+    }
+    let pixel = &summary["pixel_size"];
+    if let Some(unit) = pixel["unit"].as_str() {
+        lines.push(format!("{:<14}{} x {} {unit}", "pixel size", pixel["width"], pixel["height"]));
     }
     if summary["first_frame"].is_object() {
         lines.push(format!("{:<14}{}", "first frame", statistics_line(&summary["first_frame"])));

@@ -3,7 +3,7 @@
 use super::arguments::{ComputeArguments, GridArguments, InputArguments, MessageArguments, MethodArguments};
 use super::flow::{Prepared, prepare_with_covariance};
 use super::interrupt::Watch;
-use super::open::open_input;
+use super::open::{open_input, refuse_inputs};
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow, table_target};
 use crate::error::{Error, Result};
@@ -12,14 +12,14 @@ use crate::pipeline::{MeasuredRegion, Measurements};
 use crate::types::Region;
 use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Options of `measure`.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(
     after_help = "Rows: frame, time_s, x, y, quantity, value, std, unit, share, valid_share, status. For a region (default: the whole frame) one affine\n\
-    motion is fitted to the estimates that follow it, a share of all; the status is no_dominant_motion and the value NaN where\n\
+    motion is fitted to the valid estimates that follow it, a share of them; the status is no_dominant_motion and the value NaN where\n\
     that is half of them or less. std knows of their errors, their overlap and their scatter. With --points every point has its rows.\n\
     Rates are per second where the frame rate is known (--fps, or the file), else per frame; rpm needs it.\n\n\
     Quantities: divergence, curl, shear_magnitude, shear_axis, strain_xx, strain_xy, strain_yy, angular_velocity, rpm,\n\
@@ -45,8 +45,8 @@ pub struct MeasureCommand {
     #[arg(long, value_name = "X,Y,X,Y,...", help_heading = "Where", allow_hyphen_values = true, value_parser = parse_polygon, conflicts_with = "points")]
     pub polygon: Option<Region>,
     /// The motion around this pixel [default: the motion that most of the region follows]
-    #[arg(long, value_name = "X,Y", help_heading = "Where", value_parser = parse_seed, conflicts_with = "points")]
-    pub seed: Option<(f64, f64)>,
+    #[arg(long, value_name = "X,Y", help_heading = "Where", value_parser = parse_pixel, conflicts_with = "points")]
+    pub at: Option<(f64, f64)>,
     /// A .csv file [default: standard output]
     #[arg(long, short, value_name = "FILE", help_heading = "Output")]
     pub output: Option<PathBuf>,
@@ -64,21 +64,23 @@ impl MeasureCommand {
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let quantities: Vec<Quantity> =
             self.quantity.iter().map(|name| Quantity::parse(&name.replace('-', "_"))).collect::<Result<_>>()?;
+        let output = [("output", self.output.as_deref())];
+        refuse_inputs(self.input.input.iter().map(Path::new), &output, self.force)?;
         let target = table_target(self.output.as_deref(), self.force, self.messages.json)?;
-        let opened = open_input(&self.input)?;
+        let mut opened = open_input(&self.input)?;
         if let Some(quantity) = quantities.iter().find(|q| q.needs_fps() && opened.numbering.rate.is_none()) {
             let expected = format!("frames per second, for {}", quantity.name());
             return Err(Error::argument("fps", expected, "none, and the input does not say"));
         }
         let Prepared { plan, is_double, .. } = prepare_with_covariance(
-            &opened,
+            &mut opened,
             &self.input,
             &self.method,
             &self.grid,
             &self.compute,
             "for the standard deviations",
         )?;
-        let place = MeasuredRegion { region: self.disc.clone().or(self.polygon.clone()), seed: self.seed };
+        let place = MeasuredRegion { region: self.disc.clone().or(self.polygon.clone()), at: self.at };
         if let Some(region) = &place.region {
             region.check(opened.first.size)?;
         }
@@ -114,7 +116,7 @@ fn parse_polygon(text: &str) -> std::result::Result<Region, String> {
     Ok(Region::Polygon(corners.as_chunks::<2>().0.iter().map(|&[x, y]| (x, y)).collect()))
 }
 
-fn parse_seed(text: &str) -> std::result::Result<(f64, f64), String> {
+fn parse_pixel(text: &str) -> std::result::Result<(f64, f64), String> {
     match numbers(text).as_deref() {
         Some(&[x, y]) => Ok((x, y)),
         _ => Err("expected X,Y in pixels".into()),

@@ -1,17 +1,17 @@
 //! From input arguments to a source, and what is known about it before the run.
 
-use super::{arguments::ComputeArguments, arguments::InputArguments};
+use super::arguments::{ComputeArguments, InputArguments, UnitArguments};
 use crate::error::{Error, Result};
 use crate::flow::InitialFlow;
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::io::{
-    ChannelPolicy, Colour, FilesSource, FrameFormat, FrameSource, OpenOptions, Selected, open, open_colour, read_flo,
-    read_image, read_kitti,
+    ChannelPolicy, Colour, FilesSource, FrameFormat, FrameSource, OpenOptions, PixelSize, Selected, open, open_colour,
+    read_flo, read_image, read_kitti,
 };
 use crate::parallel::Threads;
 use crate::pipeline::{FirstFrame, Numbering, peek};
 use crate::simd::Level;
-use crate::types::{AnyColourFrame, AnyFrame, Frame, Mask, Precision};
+use crate::types::{AnyColourFrame, AnyFrame, Frame, Mask, Precision, Units};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -25,8 +25,26 @@ pub struct Opened<F = AnyFrame> {
     pub frames: Option<usize>,
     /// Which frames of the input these are, and how fast.
     pub numbering: Numbering,
+    /// Whether the frame rate is what the file says.
+    pub has_own_rate: bool,
+    /// Size of a pixel as the file says, while no option replaces it.
+    pub pixel_size: Option<PixelSize>,
     /// What the input is, for messages and metadata.
     pub name: String,
+}
+
+impl<F> Opened<F> {
+    /// The units of fields: the pixel's size is that `given`, else that of the file, else 1 px.
+    pub fn units(&mut self, given: &UnitArguments) -> Units {
+        let period = self.numbering.period();
+        if given.pixel_pitch.is_some() {
+            self.pixel_size = None;
+        }
+        match &self.pixel_size {
+            Some(size) => Units::new(size.pitch, Some(&size.unit), period),
+            None => given.units(period),
+        }
+    }
 }
 
 /// Opens the input and looks at its first frame.
@@ -47,10 +65,36 @@ pub fn open_colour_input(arguments: &InputArguments) -> Result<Opened<AnyColourF
 fn looked_at<F: FrameFormat>(source: Box<dyn FrameSource<F>>, arguments: &InputArguments) -> Result<Opened<F>> {
     let frames = source.len_hint();
     let name = source.describe();
-    let numbering = arguments.selection.numbering(arguments.fps, source.frame_rate());
+    let (rate, pixel_size) = (source.frame_rate(), source.pixel_size());
+    let numbering = arguments.selection.numbering(arguments.fps, rate);
+    let has_own_rate = arguments.fps.is_none() && rate.is_some();
     let (first, source) = peek(source)?;
     let first = first.ok_or_else(|| Error::argument("input", "at least one frame", format!("none in {name}")))?;
-    Ok(Opened { source, first, frames, numbering, name })
+    Ok(Opened { source, first, frames, numbering, has_own_rate, pixel_size, name })
+}
+
+/// Refuses to replace what is read, which not even `force` is meant for; `outputs` by their options.
+pub fn refuse_inputs<'a>(
+    inputs: impl Iterator<Item = &'a Path>,
+    outputs: &[(&'static str, Option<&Path>)],
+    force: bool,
+) -> Result<()> {
+    // A pattern stands for what it matches.
+    let matched = |input: &Path| match input.canonicalize() {
+        Ok(path) => vec![path],
+        Err(_) => glob::glob(&input.to_string_lossy())
+            .map(|paths| paths.flatten().filter_map(|path| path.canonicalize().ok()).collect())
+            .unwrap_or_default(),
+    };
+    let inputs: Vec<PathBuf> = inputs.flat_map(matched).collect();
+    for (option, path) in outputs {
+        let Some((path, output)) = path.and_then(|path| Some((path, path.canonicalize().ok()?))) else { continue };
+        let is_read = |input: &PathBuf| *input == output || force && input.parent() == Some(&output);
+        if inputs.iter().any(is_read) {
+            return Err(Error::argument(option, "another place than the input", path.display()));
+        }
+    }
+    Ok(())
 }
 
 /// One specification, or several image files in the order given.
@@ -70,7 +114,7 @@ fn open_files<P: ChannelPolicy>(
     if let Some(folder) = many.iter().find(|path| Path::new(path).is_dir()) {
         return Err(Error::argument("input", "image files only, when several inputs are given", folder));
     }
-    let files = FilesSource::new(many.iter().map(PathBuf::from).collect(), policy)?;
+    let files = FilesSource::new(many.iter().map(PathBuf::from).collect(), policy)?.with_planes(options.planes);
     Ok(Box::new(Selected::new(files, options)?))
 }
 

@@ -6,7 +6,7 @@ use super::open::Opened;
 use super::progress::Bar;
 use super::report::{Report, print_message};
 use crate::error::{Error, Result};
-use crate::io::FrameSource;
+use crate::io::{FrameSource, PixelSize};
 use crate::pipeline::{FieldSink, Pipeline, Summary, TableTarget, check_target, is_folder};
 use crate::simd::SimdReal;
 use crate::temporal::{FlowStream, StreamPlan};
@@ -56,6 +56,9 @@ pub fn report(summary: &Summary, failure: Option<Error>, context: ReportContext<
     let output = place(summary, context.output, failure.is_none());
     if !context.messages.quiet && (failure.is_none() || interrupted) {
         print_message(&in_words(summary, output));
+        if let Some(scale) = scale_in_words(&context.details) {
+            print_message(&scale);
+        }
     }
     let mut object = json!({
         "command": context.command,
@@ -104,12 +107,28 @@ fn in_words(summary: &Summary, output: Option<&Path>) -> String {
     parts.join(", ")
 }
 
+/// A pixel's size for a summary.
+pub(super) fn pixel_size(size: &PixelSize) -> Value {
+    json!({"width": size.pitch.0, "height": size.pitch.1, "unit": size.unit})
+}
+
+/// What was taken from the file instead of an option, in words.
+fn scale_in_words(details: &Value) -> Option<String> {
+    let rate = (details["fps_from"] == "file").then(|| format!("{} frames/s", details["fps"]));
+    let pixel = &details["pixel_size"];
+    let size = pixel["unit"].as_str().map(|unit| format!("pixels of {} x {} {unit}", pixel["width"], pixel["height"]));
+    let parts: Vec<String> = rate.into_iter().chain(size).collect();
+    (!parts.is_empty()).then(|| format!("as the file says: {}", parts.join(", ")))
+}
+
 /// The entries about the input that every summary has.
 pub fn input_details(opened: &Opened, grid: &GridArguments) -> Value {
     let (width, height) = opened.first.size;
     json!({
         "input": opened.name, "width": width, "height": height, "dtype": opened.first.dtype,
         "fps": opened.numbering.rate,
+        "fps_from": opened.numbering.rate.map(|_| if opened.has_own_rate { "file" } else { "option" }),
+        "pixel_size": opened.pixel_size.as_ref().map(pixel_size),
         "region": grid.region.map(|r| [r.x, r.y, r.width, r.height]), "stride": grid.stride.unwrap_or(1),
     })
 }

@@ -2,6 +2,7 @@
 
 use super::arguments::{LayoutArguments, MessageArguments, SearchArguments, SelectionArguments, ThreadArguments};
 use super::interrupt::Watch;
+use super::open::refuse_inputs;
 use super::progress::Bar;
 use super::report::{Report, print_message};
 use crate::error::{Error, Result};
@@ -93,6 +94,8 @@ struct Done {
 impl StereoCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
+        let outputs = [("output", self.output.as_deref()), ("picture", self.picture.as_deref())];
+        refuse_inputs(self.input.iter().map(Path::new), &outputs, self.force)?;
         let options = self.options()?;
         let formats = self.formats()?;
         self.check_output(&formats)?;

@@ -11,6 +11,7 @@ use super::arguments::{
     ThreadArguments, TrackerArguments,
 };
 use super::interrupt::Watch;
+use super::open::refuse_inputs;
 use super::report::Report;
 use crate::error::{Error, Result};
 use clap::Args;
@@ -80,7 +81,6 @@ impl TrackCommand {
     fn refuse_the_input_as_output(&self) -> Result<()> {
         let boxes = self.particle.box_file.iter().map(PathBuf::as_path);
         let given = self.input.input.iter().map(Path::new).chain(boxes);
-        let inputs: Vec<_> = given.filter_map(|input| input.canonicalize().ok()).collect();
         let outputs = [
             ("overlay", &self.output.overlay),
             ("disparity-overlay", &self.stereo.disparity_overlay),
@@ -90,13 +90,7 @@ impl TrackCommand {
             ("csv", &self.particle.csv),
             ("output", &self.output.output),
         ];
-        for (option, path) in outputs {
-            let Some(path) = path else { continue };
-            if path.canonicalize().is_ok_and(|path| inputs.contains(&path)) {
-                return Err(Error::argument(option, "another place than the input", path.display()));
-            }
-        }
-        Ok(())
+        refuse_inputs(given, &outputs.map(|(option, path)| (option, path.as_deref())), self.output.force)
     }
 
     /// Refuses an option that belongs to another method.

@@ -7,11 +7,13 @@
 //! point.
 //!
 //! Means, covariances and noise that are not finite, symmetric and positive semi-definite are refused by name
-//! at every step. Covariances stay so: updates use the Joseph form, and a matrix that loses that in a step is
-//! repaired and counted in [`GaussianState::repairs`].
+//! at every step. Covariances stay so: every step works on their roots (`update`, `moments`), and one that an
+//! unscented transform makes indefinite is repaired and counted in [`GaussianState::repairs`]. A state that
+//! cannot make a step is left as it was and marked in [`GaussianState::failed`]; the batch goes on.
 //!
-//! `state` is what `kalman`, `extended` and `unscented` (with `sigma_points`) share; [`particle`] stands
-//! alone. `scalar` is the update by one number, for small states on the stack.
+//! `state` (with `update`, `failures`, `checks`) is what `kalman`, `extended` and `unscented` (with
+//! `sigma_points` and `moments`) share, `smoother` too; a [`Manifold`] subtracts and averages angles.
+//! [`particle`] stands alone. `scalar` is the update by one number, for small states on the stack.
 //!
 //! ```
 //! use jacoflow::filter::{SigmaPoints, UnscentedFilter};
@@ -40,17 +42,26 @@
 //! # }
 //! ```
 
+mod checks;
 mod extended;
+mod failures;
 mod kalman;
+mod manifold;
+mod moments;
 pub mod particle;
 mod scalar;
 mod sigma_points;
+mod smoother;
 mod state;
 mod unscented;
+mod update;
 
+pub use checks::{check_covariances, check_dimension, check_mean};
 pub use extended::ExtendedFilter;
 pub use kalman::KalmanFilter;
+pub use manifold::{Manifold, Vectors};
 pub use scalar::update_by_scalar;
 pub use sigma_points::SigmaPoints;
-pub use state::{GaussianState, check_covariances, check_dimension, check_mean};
+pub use smoother::Smoothed;
+pub use state::GaussianState;
 pub use unscented::UnscentedFilter;

@@ -105,8 +105,8 @@ impl SigmaPoints {
         if n == 0 || p.len() != n * n {
             return Err(Error::argument("P", format!("a {n} x {n} matrix with n > 0"), format!("{} values", p.len())));
         }
-        super::state::check_dimension("x", n)?;
-        super::state::check_mean(x)?;
+        super::checks::check_dimension("x", n)?;
+        super::checks::check_mean(x)?;
         self.check(n)?;
         let mut l = vec![0.0; n * n];
         if !crate::math::dense::cholesky(p, n, &mut l) {

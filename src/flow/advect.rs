@@ -45,8 +45,8 @@ struct Between {
 /// A field in other units is converted to px and frames first. A field of velocities (`Interval::Instant`)
 /// is taken for steps.
 ///
-/// # Errors [`Error::Argument`] naming `field` for a list of points instead of a grid, `covariance` for another
-/// number of matrices than of points.
+/// # Errors [`Error::Argument`] naming `field` for a list of points instead of a grid, `covariance` for
+/// another number of matrices than of points.
 pub fn advect<T: Real>(
     field: &FlowField<T>,
     points: &[[f64; 2]],

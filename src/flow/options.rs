@@ -39,7 +39,7 @@ impl InitialFlow {
 }
 
 /// Options that all methods share.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct EstimatorOptions {
     /// Pixels to estimate at. Default: all. Nothing else is computed.
     pub sites: SamplingGrid,
@@ -63,23 +63,6 @@ pub struct EstimatorOptions {
     pub threads: Threads,
     /// Instruction set. `None` (default): the best of the processor, or `JACOFLOW_SIMD`.
     pub simd: Option<Level>,
-}
-
-impl Default for EstimatorOptions {
-    fn default() -> Self {
-        Self {
-            sites: SamplingGrid::default(),
-            mask: None,
-            initial: None,
-            units: Units::default(),
-            covariance: false,
-            systematic: false,
-            diagnostics: false,
-            noise: None,
-            threads: Threads::default(),
-            simd: None,
-        }
-    }
 }
 
 impl EstimatorOptions {

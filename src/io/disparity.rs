@@ -122,7 +122,10 @@ fn read_npz(path: &Path) -> Result<DisparityMap> {
         let array = npz.real_array::<f32>(name)?;
         match array.shape[..] {
             [height, width] => Frame::new(width, height, array.values),
-            _ => Err(Error::format(path, format!("array '{name}' has shape {:?}, expected (H, W)", array.shape))),
+            _ => Err(Error::format(
+                path,
+                format!("array '{name}' has shape {}, expected (H, W)", crate::error::shape_text(&array.shape)),
+            )),
         }
     };
     let disparity = plane(&mut npz, "disparity")?;

@@ -266,7 +266,9 @@ pub fn read_npz_from<T: Real, R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<
 fn read_points<R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<Vec<(usize, usize)>> {
     let points = npz.array::<i64>("points")?;
     if points.shape.len() != 2 || points.shape[1] != 2 {
-        return Err(npz.wrong("points", &format!("has shape {:?}, expected (N, 2)", points.shape)));
+        return Err(
+            npz.wrong("points", &format!("has shape {}, expected (N, 2)", crate::error::shape_text(&points.shape)))
+        );
     }
     let pair = |p: &[i64]| Some((usize::try_from(p[0]).ok()?, usize::try_from(p[1]).ok()?));
     let points: Option<_> = points.values.chunks_exact(2).map(pair).collect();

@@ -3,7 +3,7 @@
 //!
 //! Little-endian: float32 202021.25, int32 width, int32 height, then `u, v` interleaved row by row.
 
-use super::{FlowImage, decode::check_size, write::atomic_io};
+use super::{FlowImage, limits::check_size, write::atomic_io};
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{Read, Write};

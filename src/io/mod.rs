@@ -7,19 +7,23 @@
 mod channels;
 mod decode;
 mod disparity;
+mod exact;
 mod field_format;
 mod field_npz;
 mod flo;
 mod flow_image;
 mod jpeg;
 mod kitti;
+mod limits;
 mod mot;
 mod npy;
 pub mod npz;
 mod numbered;
+mod pages;
 mod pfm;
 mod picture_png;
 mod picture_sequence;
+mod planes;
 mod sink;
 mod sixteen_bit_png;
 mod source;
@@ -29,7 +33,7 @@ pub mod write;
 mod ycbcr;
 
 pub use channels::{ChannelPolicy, Colour, FrameFormat, Grey};
-pub use decode::read_image;
+pub use decode::{read_image, read_plane};
 pub use disparity::{DisparityFormat, DisparityMap};
 pub use field_format::FieldFormat;
 pub use field_npz::{StoredField, read_npz, read_npz_from, write_npz, write_npz_to};
@@ -42,6 +46,7 @@ pub use numbered::NumberedFiles;
 pub use pfm::{FloatMap, read_pfm, write_pfm};
 pub use picture_png::{write_colour_png, write_frame_png, write_picture};
 pub use picture_sequence::SequenceWriter;
+pub use planes::{PixelSize, PlaneSelection, Slices};
 pub use sink::{ColourSink, FrameSink, NpySink, PngSink, Y4mSink, check_sink, open_colour_sink, open_sink};
 pub use source::{
     ColourSource, FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected, ViewLayout,

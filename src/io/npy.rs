@@ -16,8 +16,18 @@ pub enum ElementType {
     U16,
     /// numpy `uint32`.
     U32,
+    /// numpy `uint64`.
+    U64,
+    /// numpy `int8`.
+    I8,
+    /// numpy `int16`.
+    I16,
+    /// numpy `int32`.
+    I32,
     /// numpy `int64`.
     I64,
+    /// numpy `float16`.
+    F16,
     /// numpy `float32`.
     F32,
     /// numpy `float64`.
@@ -30,10 +40,10 @@ impl ElementType {
     /// Bytes of one element.
     pub fn size(self) -> usize {
         match self {
-            Self::Bool | Self::U8 => 1,
-            Self::U16 => 2,
-            Self::U32 | Self::F32 => 4,
-            Self::I64 | Self::F64 => 8,
+            Self::Bool | Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 | Self::F16 => 2,
+            Self::U32 | Self::I32 | Self::F32 => 4,
+            Self::U64 | Self::I64 | Self::F64 => 8,
             Self::Text(characters) => characters.saturating_mul(4),
         }
     }
@@ -45,7 +55,12 @@ impl ElementType {
             Self::U8 => "|u1".into(),
             Self::U16 => "<u2".into(),
             Self::U32 => "<u4".into(),
+            Self::U64 => "<u8".into(),
+            Self::I8 => "|i1".into(),
+            Self::I16 => "<i2".into(),
+            Self::I32 => "<i4".into(),
             Self::I64 => "<i8".into(),
+            Self::F16 => "<f2".into(),
             Self::F32 => "<f4".into(),
             Self::F64 => "<f8".into(),
             Self::Text(characters) => format!("<U{characters}"),
@@ -62,7 +77,12 @@ impl ElementType {
             "u1" => Self::U8,
             "u2" => Self::U16,
             "u4" => Self::U32,
+            "u8" => Self::U64,
+            "i1" => Self::I8,
+            "i2" => Self::I16,
+            "i4" => Self::I32,
             "i8" => Self::I64,
+            "f2" => Self::F16,
             "f4" => Self::F32,
             "f8" => Self::F64,
             _ => Self::Text(rest.strip_prefix('U')?.parse().ok().filter(|&n| n <= MAX_TEXT)?),
@@ -95,6 +115,11 @@ impl NpyHeader {
     /// A little-endian array in C order.
     pub fn new(element: ElementType, shape: &[usize]) -> Self {
         Self { element, big_endian: false, fortran_order: false, shape: shape.to_vec() }
+    }
+
+    /// The shape as Python writes it: `(2, 48, 64)`.
+    pub fn shown(&self) -> String {
+        crate::error::shape_text(&self.shape)
     }
 
     /// Number of elements; `None` when it does not fit a machine word.
@@ -164,7 +189,7 @@ impl NpyHeader {
             .ok_or_else(|| bad("the .npy array is a record, not plain numbers"))?;
         let (element, big_endian) = ElementType::parse(descriptor).ok_or_else(|| {
             bad(format!(
-                "element type '{descriptor}' is not one of bool, uint8, uint16, uint32, int64, float32, float64, str"
+                "element type '{descriptor}' is not one of bool, integers of 8 to 64 bits, float16, float32, float64, str"
             ))
         })?;
         let fortran_order = match value_of(text, "fortran_order")? {
@@ -223,7 +248,9 @@ macro_rules! elements {
         }
     )*};
 }
-elements! { u8, U8; u16, U16; u32, U32; i64, I64; f32, F32; f64, F64; }
+elements! {
+    u8, U8; u16, U16; u32, U32; u64, U64; i8, I8; i16, I16; i32, I32; i64, I64; half::f16, F16; f32, F32; f64, F64;
+}
 
 /// Writes `values` as little-endian bytes, a block at a time.
 pub fn write_values<T: Element>(values: &[T], out: &mut impl Write) -> io::Result<()> {
@@ -238,6 +265,10 @@ pub fn write_values<T: Element>(values: &[T], out: &mut impl Write) -> io::Resul
 
 /// Values stored with the first axis fastest, put in C order.
 pub(crate) fn from_fortran_order<T: Copy>(values: &[T], shape: &[usize]) -> Vec<T> {
+    // Without values, the other axes may be of any length, and strides beyond a machine word.
+    if values.is_empty() {
+        return Vec::new();
+    }
     let mut strides = Vec::with_capacity(shape.len());
     let mut stride = 1;
     for &axis in shape {

@@ -51,7 +51,11 @@ impl<W: Write + Seek> NpzWriter<W> {
     pub fn array<T: Element>(&mut self, name: &str, shape: &[usize], values: &[T]) -> Result<()> {
         let header = NpyHeader::new(T::TYPE, shape);
         if header.count() != Some(values.len()) {
-            return Err(Error::argument("values", format!("as many as the shape {shape:?} holds"), values.len()));
+            return Err(Error::argument(
+                "values",
+                format!("as many as the shape {} holds", header.shown()),
+                values.len(),
+            ));
         }
         self.array_from(name, &header, |out| write_values(values, out))
     }
@@ -205,7 +209,7 @@ impl<R: Read + Seek> NpzReader<R> {
         };
         let (header, _) = NpyHeader::read(&mut entry).map_err(|e| wrong(format!("is damaged: {e}")))?;
         let expected =
-            header.byte_count().ok_or_else(|| wrong(format!("has an impossible shape {:?}", header.shape)))?;
+            header.byte_count().ok_or_else(|| wrong(format!("has an impossible shape {}", header.shown())))?;
         // Grown as the bytes come: what the header claims is not taken on trust.
         let mut bytes = Vec::new();
         let damaged = |e| wrong(format!("is damaged: {e}"));

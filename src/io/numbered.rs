@@ -26,6 +26,30 @@ impl NumberedFiles {
         Ok(Self { folder: folder.to_path_buf(), stem: stem.into(), extension: extension.into() })
     }
 
+    /// Removes the files of an earlier run, which would be read as part of this one: those with these names,
+    /// of any number.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the folder cannot be read or a file not removed.
+    pub fn clear(&self) -> Result<()> {
+        let entries = std::fs::read_dir(&self.folder).map_err(|e| Error::io(&self.folder, e))?;
+        for entry in entries {
+            let path = entry.map_err(|e| Error::io(&self.folder, e))?.path();
+            if path.file_name().and_then(|name| name.to_str()).is_some_and(|name| self.is_own(name)) && path.is_file() {
+                std::fs::remove_file(&path).map_err(|e| Error::io(&path, e))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether [`NumberedFiles::path`] gives this name to a frame.
+    fn is_own(&self, name: &str) -> bool {
+        let ending = format!(".{}", self.extension);
+        let rest = name.strip_prefix(&self.stem).and_then(|rest| rest.strip_prefix('_'));
+        let number = rest.and_then(|rest| rest.strip_suffix(&ending)).unwrap_or_default();
+        number.len() >= 6 && number.bytes().all(|digit| digit.is_ascii_digit())
+    }
+
     /// The name for the frame `index`: six digits, more where needed.
     pub fn path(&self, index: usize) -> PathBuf {
         self.folder.join(format!("{}_{index:06}.{}", self.stem, self.extension))

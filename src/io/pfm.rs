@@ -1,6 +1,6 @@
 //! `.pfm`, the portable float map: one or three planes of float32, rows from the bottom up.
 
-use super::{decode::check_size, write::atomic_io};
+use super::{limits::check_size, write::atomic_io};
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -64,6 +64,12 @@ pub fn read_pfm(path: impl AsRef<Path>) -> Result<FloatMap> {
     let (width, height) = (side()?, side()?);
     check_size(path, width, height)?;
     let scale: f64 = word(&mut file, path)?.parse().map_err(|_| bad("its scale is no number"))?;
+    // Its sign is the byte order, which 0 and NaN do not say.
+    if scale == 0.0 || !scale.is_finite() {
+        return Err(bad(&format!(
+            "its scale is {scale}; expected a number below 0 (little-endian) or above (big-endian)"
+        )));
+    }
     let (needed, mut bytes) = (4 * channels * width * height, Vec::new());
     file.take(needed as u64).read_to_end(&mut bytes).map_err(|e| Error::io(path, e))?;
     if bytes.len() < needed {

@@ -1,6 +1,6 @@
 //! PNG files of 16 bits, as the KITTI benchmark keeps flow and disparity.
 
-use super::{decode::check_size, decode::png_error, write::atomic};
+use super::{decode::png_error, limits::check_size, write::atomic};
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::BufReader;

@@ -25,6 +25,20 @@ pub fn multiply_transposed(a: &[f64], b: &[f64], inner: usize, out: &mut [f64]) 
     }
 }
 
+/// Adds `a a^T` to a symmetric matrix, with `a` of rows of `inner` values.
+pub fn add_gram(a: &[f64], inner: usize, out: &mut [f64]) {
+    let rows = a.len() / inner;
+    for (i, first) in a.chunks_exact(inner).enumerate() {
+        for (j, second) in a.chunks_exact(inner).enumerate().take(i + 1) {
+            let product: f64 = first.iter().zip(second).map(|(a, b)| a * b).sum();
+            out[i * rows + j] += product;
+            if i != j {
+                out[j * rows + i] += product;
+            }
+        }
+    }
+}
+
 /// Replaces a square matrix by its symmetric part.
 pub fn symmetrise(a: &mut [f64], n: usize) {
     for i in 0..n {
@@ -106,16 +120,81 @@ pub fn covariance_fault(a: &[f64], n: usize) -> Option<String> {
     Some(format!("one with the eigenvalue {least}"))
 }
 
-/// Gives a covariance that lost its eigenvalues' sign in a step one that has it. `Some(true)`: it was mended;
-/// `None`: nothing can be done.
-pub fn mend(a: &mut [f64], n: usize) -> Option<bool> {
+/// How small a pivot may be relative to its diagonal entry before it is rounding, per dimension.
+const PIVOT_ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// The lower root of a covariance, `a = l l^T` to rounding, singular ones included: a component without
+/// variance has a column of zeros, and a pivot lost to rounding is raised to the size of rounding. An
+/// indefinite matrix is repaired first. Returns whether it was; `None` when an entry is not finite.
+pub fn covariance_root(a: &mut [f64], n: usize, l: &mut [f64]) -> Option<bool> {
+    if cholesky(a, n, l) {
+        return Some(false);
+    }
     if a.iter().any(|v| !v.is_finite()) {
         return None;
     }
-    if negative_eigenvalue(a, n).is_none() {
+    if singular_cholesky(a, n, l) {
         return Some(false);
     }
-    factor(a, n, &mut vec![0.0; n * n])
+    // Eigenvalues are raised in units in which every variance is one, so that small components count. A
+    // negative variance is of the size of its error: its sign is changed.
+    let scale: Vec<f64> = (0..n).map(|k| a[k * n + k].abs().sqrt()).collect();
+    symmetrise(a, n);
+    let used: Vec<usize> = (0..n).filter(|&k| scale[k] > 0.0).collect();
+    let m = used.len();
+    let correlation =
+        DMatrix::from_fn(
+            m,
+            m,
+            |i, j| {
+                if i == j { 1.0 } else { a[used[i] * n + used[j]] / scale[used[i]] / scale[used[j]] }
+            },
+        );
+    let eigen = SymmetricEigen::new(correlation);
+    for floor in [1e-12, 1e-10, 1e-8] {
+        let raised = eigen.eigenvalues.map(|v| v.max(floor));
+        let repaired = &eigen.eigenvectors * DMatrix::from_diagonal(&raised) * eigen.eigenvectors.transpose();
+        a.fill(0.0);
+        for (i, &row) in used.iter().enumerate() {
+            for (j, &column) in used.iter().enumerate() {
+                a[row * n + column] = repaired[(i, j)] * scale[row] * scale[column];
+            }
+        }
+        symmetrise(a, n);
+        if singular_cholesky(a, n, l) {
+            return Some(true);
+        }
+    }
+    None
+}
+
+/// As [`cholesky`], for matrices that are singular to rounding.
+fn singular_cholesky(a: &[f64], n: usize, l: &mut [f64]) -> bool {
+    l.fill(0.0);
+    let rounding = PIVOT_ROUNDING * n as f64;
+    for j in 0..n {
+        let variance = a[j * n + j];
+        if variance == 0.0 {
+            // The row to the left is zero where a is positive semi-definite, and so is the column below.
+            if (0..n).any(|i| a[j * n + i] != 0.0 || a[i * n + j] != 0.0) {
+                return false;
+            }
+            continue;
+        }
+        let row: f64 = l[j * n..j * n + j].iter().map(|v| v * v).sum();
+        let pivot = variance - row;
+        // Also where the variance itself is negative.
+        if pivot.is_nan() || pivot < -rounding * variance {
+            return false;
+        }
+        let root = pivot.max(rounding * variance).sqrt();
+        l[j * n + j] = root;
+        for i in j + 1..n {
+            let dot: f64 = (0..j).map(|k| l[i * n + k] * l[j * n + k]).sum();
+            l[i * n + j] = (a[i * n + j] - dot) / root;
+        }
+    }
+    true
 }
 
 /// The least eigenvalue of a symmetric matrix where it is negative by more than rounding.
@@ -133,19 +212,23 @@ fn negative_eigenvalue(a: &[f64], n: usize) -> Option<f64> {
     Some(values.min()).filter(|least| *least < -ROUNDING * largest)
 }
 
-/// Solves `l l^T x = b` in place.
+/// Solves `l l^T x = b` in place; a component without a pivot, which has no variance, becomes zero.
 pub fn solve(l: &[f64], n: usize, b: &mut [f64]) {
     forward(l, n, b);
     for i in (0..n).rev() {
         let dot: f64 = (i + 1..n).map(|k| l[k * n + i] * b[k]).sum();
-        b[i] = (b[i] - dot) / l[i * n + i];
+        b[i] = divide(b[i] - dot, l[i * n + i]);
     }
 }
 
-/// Solves `l x = b` in place.
+fn divide(value: f64, pivot: f64) -> f64 {
+    if pivot == 0.0 { 0.0 } else { value / pivot }
+}
+
+/// Solves `l x = b` in place, with zeros as in [`solve`].
 pub fn forward(l: &[f64], n: usize, b: &mut [f64]) {
     for i in 0..n {
         let dot: f64 = (0..i).map(|k| l[i * n + k] * b[k]).sum();
-        b[i] = (b[i] - dot) / l[i * n + i];
+        b[i] = divide(b[i] - dot, l[i * n + i]);
     }
 }

@@ -12,6 +12,7 @@ use super::seeding;
 use super::start::{from_labels, from_shares};
 use crate::error::Result;
 use crate::math::random::CounterRng;
+use crate::parallel::checkpoint;
 
 /// Where a fit begins.
 #[derive(Debug, Clone, Copy)]
@@ -132,6 +133,7 @@ impl<'a> Problem<'a> {
         let mut lower_bounds = Vec::new();
         let mut same_components = true;
         loop {
+            checkpoint();
             let mut moments = earlier.map_or_else(|| expected.moments.clone(), |e| e.moments.merged(&expected.moments));
             let negentropy = expected.negentropy + earlier.map_or(0.0, |earlier| earlier.negentropy);
             let mut posterior = Posterior::maximised(&self.prior, &moments);

@@ -10,6 +10,7 @@ use std::f64::consts::{LN_2, TAU};
 
 /// `pi ~ Dir(alpha)` (22), `mu_k ~ N(m_k, (beta_k Lambda_k)^-1)`, `Lambda_k ~ W(W_k, nu_k)` (24).
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Posterior {
     /// D.
     pub dimensions: usize,

@@ -251,7 +251,13 @@ impl Task<'_, '_> {
             solution.weighted_by_posterior(&scaled.observations, known, self.options.weight_depths.is_some());
         }
         let wider = match (scaled.unknown, self.known) {
-            (true, known) => of_estimated_noise(inliers.n, known.is_some()),
+            (true, known) => {
+                let Some(wider) = of_estimated_noise(inliers.n, known.is_some()) else {
+                    (solution.covariance, solution.plugged) = (None, None);
+                    return;
+                };
+                wider
+            }
             // The residuals determine how large correlated errors are.
             (false, _) if self.options.correlation().is_some() => 1.0,
             (false, None) => misfit(inliers, cost),

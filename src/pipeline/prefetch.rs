@@ -2,8 +2,9 @@
 //! read never keeps the run from being stopped.
 
 use crate::error::{Error, Result};
-use crate::io::{FrameFormat, FrameSource, ViewPairs};
+use crate::io::{FrameFormat, FrameSource, PixelSize, ViewPairs};
 use crate::types::AnyFrame;
+use std::cell::Cell;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
@@ -15,26 +16,28 @@ const PATIENCE: Duration = Duration::from_millis(50);
 
 /// The receiving end of a reader thread.
 pub(super) struct Prefetch<T = AnyFrame> {
-    frames: Receiver<Result<T>>,
+    frames: Receiver<Result<(T, Option<f64>)>>,
+    /// Time that the source has for the frame received last, s.
+    time: Cell<Option<f64>>,
 }
 
 impl<F: FrameFormat> Prefetch<F> {
     /// Starts to read the frames of `source`.
     pub(super) fn start(mut source: Box<dyn FrameSource<F>>) -> Result<Self> {
-        Self::of(move || source.next_frame())
+        Self::of(move || Ok(source.next_frame()?.map(|frame| (frame, source.time()))))
     }
 }
 
 impl Prefetch<[AnyFrame; 2]> {
     /// Starts to read pairs of views.
     pub(super) fn pairs(mut views: ViewPairs) -> Result<Self> {
-        Self::of(move || views.next_pair())
+        Self::of(move || Ok(views.next_pair()?.map(|pair| (pair, None))))
     }
 }
 
 impl<T: Send + 'static> Prefetch<T> {
     /// Starts to call `read`. The thread ends at the end, at the first error, or when this is dropped.
-    fn of(mut read: impl FnMut() -> Result<Option<T>> + Send + 'static) -> Result<Self> {
+    fn of(mut read: impl FnMut() -> Result<Option<(T, Option<f64>)>> + Send + 'static) -> Result<Self> {
         let (sender, frames) = sync_channel(READ_AHEAD);
         std::thread::Builder::new()
             .name("jacoflow-reader".into())
@@ -47,18 +50,29 @@ impl<T: Send + 'static> Prefetch<T> {
                 }
             })
             .map_err(|error| Error::io("reader thread", error))?;
-        Ok(Self { frames })
+        Ok(Self { frames, time: Cell::new(None) })
     }
 
     /// The next frame; calls `wait` while there is none yet and stops when `wait` fails.
     pub(super) fn next(&self, wait: impl Fn() -> Result<()>) -> Result<Option<T>> {
         loop {
             match self.frames.recv_timeout(PATIENCE) {
-                Ok(frame) => return frame.map(Some),
+                Ok(received) => {
+                    let (frame, time) = received?;
+                    self.time.set(time);
+                    return Ok(Some(frame));
+                }
                 Err(RecvTimeoutError::Disconnected) => return Ok(None),
                 Err(RecvTimeoutError::Timeout) => wait()?,
             }
         }
+    }
+}
+
+impl<T> Prefetch<T> {
+    /// Time that the source has for the frame received last, s.
+    pub(super) fn last_time(&self) -> Option<f64> {
+        self.time.get()
     }
 }
 
@@ -81,6 +95,12 @@ impl<F: FrameFormat> FrameSource<F> for Peeked<F> {
     }
     fn frame_rate(&self) -> Option<f64> {
         self.rest.frame_rate()
+    }
+    fn time(&self) -> Option<f64> {
+        self.rest.time()
+    }
+    fn pixel_size(&self) -> Option<PixelSize> {
+        self.rest.pixel_size()
     }
     fn describe(&self) -> String {
         self.rest.describe()

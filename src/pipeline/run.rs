@@ -6,6 +6,7 @@ use crate::io::FrameSource;
 use crate::parallel::Progress;
 use crate::simd::SimdReal;
 use crate::types::{AnyFrame, Status};
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -18,11 +19,13 @@ pub struct Numbering {
     pub step: usize,
     /// Frames per second of the input (before `step`).
     pub rate: Option<f64>,
+    /// Whether times that the source has for its frames replace those by `rate`.
+    pub has_own_times: bool,
 }
 
 impl Default for Numbering {
     fn default() -> Self {
-        Self { start: 0, step: 1, rate: None }
+        Self { start: 0, step: 1, rate: None, has_own_times: true }
     }
 }
 
@@ -38,6 +41,10 @@ impl Numbering {
     /// Time of input frame `index`, seconds from input frame 0.
     pub fn time(&self, index: usize) -> Option<f64> {
         self.rate.map(|rate| index as f64 / rate)
+    }
+    /// As [`Numbering::time`], where the source says `own` of this frame.
+    pub fn time_of(&self, index: usize, own: Option<f64>) -> Option<f64> {
+        own.filter(|_| self.has_own_times).or_else(|| self.time(index))
     }
 }
 
@@ -74,13 +81,24 @@ pub struct Pipeline<T> {
     numbering: Numbering,
     stage: Box<dyn Stage<T>>,
     sinks: Vec<Box<FieldSink<T>>>,
+    /// Times that the source has for the frames pushed last, the newest at the end.
+    times: VecDeque<Option<f64>>,
     summary: Summary,
 }
+
+/// Frames between the one pushed and the one that its field belongs to, at most.
+const MAX_DELAY: usize = 2;
 
 impl<T: SimdReal> Pipeline<T> {
     /// A pipeline around `stage`, without sinks.
     pub fn new(stage: Box<dyn Stage<T>>) -> Self {
-        Self { numbering: Numbering::default(), stage, sinks: Vec::new(), summary: Summary::default() }
+        Self {
+            numbering: Numbering::default(),
+            stage,
+            sinks: Vec::new(),
+            times: VecDeque::new(),
+            summary: Summary::default(),
+        }
     }
 
     /// Which frames of the input come.
@@ -131,6 +149,10 @@ impl<T: SimdReal> Pipeline<T> {
             let Some(frame) = frames.next(|| progress.step(done, total))? else { break };
             check_size(&mut size, frame.size(), self.numbering.index(done))?;
             self.summary.frames += 1;
+            self.times.push_back(frames.last_time());
+            if self.times.len() > MAX_DELAY + 1 {
+                self.times.pop_front();
+            }
             self.push(frame)?;
         }
         progress.step(self.summary.frames, total)?;
@@ -143,9 +165,12 @@ impl<T: SimdReal> Pipeline<T> {
     }
 
     fn push(&mut self, frame: AnyFrame) -> Result<()> {
-        let Some((mut field, frame)) = self.stage.push(frame)? else { return Ok(()) };
+        let time = self.times.back().copied().flatten().filter(|_| self.numbering.has_own_times);
+        let Some((mut field, frame)) = self.stage.push(frame, time)? else { return Ok(()) };
+        let delay = self.summary.frames.saturating_sub(field.layout.frame_index + 1);
+        let own = self.times.iter().rev().nth(delay).copied().flatten();
         field.layout.frame_index = self.numbering.index(field.layout.frame_index);
-        let time = self.numbering.time(field.layout.frame_index);
+        let time = self.numbering.time_of(field.layout.frame_index, own);
         let step = Step { field: &field, frame: &frame, time };
         for sink in &mut self.sinks {
             sink.accept(&step)?;

@@ -16,10 +16,11 @@ pub type Output<T> = (FlowField<T>, Arc<Frame<T>>);
 pub trait Stage<T>: Send {
     /// Frames that must have come before the first field.
     fn frames_needed(&self) -> usize;
-    /// Takes the next frame; gives a field once enough frames have come.
+    /// Takes the next frame and its time, s, where the source has times; gives a field once enough frames
+    /// have come.
     ///
     /// The field's `frame_index` counts pushed frames from 0.
-    fn push(&mut self, frame: AnyFrame) -> Result<Option<Output<T>>>;
+    fn push(&mut self, frame: AnyFrame, time: Option<f64>) -> Result<Option<Output<T>>>;
     /// How often a filter had to restart a pixel.
     fn repairs(&self) -> usize {
         0
@@ -39,8 +40,8 @@ impl<T: SimdReal> Stage<T> for FlowStream<T> {
         self.plan().estimator().frames_needed()
     }
 
-    fn push(&mut self, frame: AnyFrame) -> Result<Option<Output<T>>> {
-        let Some(field) = self.push(frame)? else { return Ok(None) };
+    fn push(&mut self, frame: AnyFrame, time: Option<f64>) -> Result<Option<Output<T>>> {
+        let Some(field) = self.push_at(frame, time)? else { return Ok(None) };
         Ok(self.reference_frame().map(|frame| (field, Arc::clone(frame))))
     }
 }
@@ -77,7 +78,8 @@ impl<T: SimdReal + Element> Stage<T> for FilterStage<T> {
         1
     }
 
-    fn push(&mut self, frame: AnyFrame) -> Result<Option<Output<T>>> {
+    /// The filter's step is one frame at any time.
+    fn push(&mut self, frame: AnyFrame, _time: Option<f64>) -> Result<Option<Output<T>>> {
         let filter = match &mut self.filter {
             Some(filter) => filter,
             empty => empty.insert(FlowFilter::new(frame.size(), self.options.clone())?),

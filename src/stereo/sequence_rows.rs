@@ -18,6 +18,7 @@ const MAX_MISALIGNMENT: f64 = 0.2;
 
 /// Matches a sequence pair by pair, and keeps its row offset.
 #[derive(Debug, Clone, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SequenceRows {
     given: Option<f64>,
     found: Option<f64>,

@@ -5,8 +5,10 @@
 //! 78)` (lower triangles, row by row), `noise_scale` `(filters, 1)` and, where there is one, `mask` `(height,
 //! width)`. numpy can read it.
 
-use super::{flow_filter::FlowFilter, kernel::N, kernel::PACKED, kernel::SCALE, options::FlowFilterOptions};
-use crate::error::{Error, Result};
+use super::{
+    flow_filter::FlowFilter, kernel::N, kernel::PACKED, kernel::SCALE, kernel::packed, options::FlowFilterOptions,
+};
+use crate::error::{Error, Result, shape_text};
 use crate::io::Element;
 use crate::io::npz::{NpzReader, NpzWriter};
 use crate::simd::SimdReal;
@@ -103,7 +105,8 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         if options.mask.is_some() {
             let array = reader.array::<u8>("mask")?;
             if array.shape != [height, width] {
-                return Err(wrong(format!("expected a mask of shape [{height}, {width}], got {:?}", array.shape)));
+                let (expected, got) = (shape_text(&[height, width]), shape_text(&array.shape));
+                return Err(wrong(format!("expected a mask of shape {expected}, got {got}")));
             }
             options.mask = Some(Frame::new(width, height, array.values.iter().map(|&used| used != 0).collect())?);
         }
@@ -114,14 +117,19 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         let status = reader.array::<u8>("status")?;
         let (columns, rows) = options.sites.shape(header.frame_size).map_err(|e| wrong(e.to_string()))?;
         if status.shape != [rows, columns] {
-            return Err(wrong(format!("expected a status of shape [{rows}, {columns}], got {:?}", status.shape)));
+            let (expected, got) = (shape_text(&[rows, columns]), shape_text(&status.shape));
+            return Err(wrong(format!("expected a status of shape {expected}, got {got}")));
         }
         let filters = status.values.iter().map(|&code| usize::from(code == Status::Ok as u8)).sum::<usize>();
         let arrays = [("mean", &mean, N), ("covariance", &covariance, PACKED), ("noise_scale", &scale, 1)];
         for (name, array, columns) in arrays {
             if array.shape != [filters, columns] {
-                return Err(wrong(format!("expected {name} of shape [{filters}, {columns}], got {:?}", array.shape)));
+                let (expected, got) = (shape_text(&[filters, columns]), shape_text(&array.shape));
+                return Err(wrong(format!("expected {name} of shape {expected}, got {got}")));
             }
+        }
+        for (name, array, columns) in arrays {
+            check_numbers(name, &array.values, columns).map_err(wrong)?;
         }
         let mut filter = Self::new(header.frame_size, options).map_err(|e| wrong(e.to_string()))?;
         if filter.store.fixed.iter().zip(&status.values).any(|(&fixed, &code)| fixed as u8 != code) {
@@ -134,6 +142,19 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         filter.repairs = header.repairs;
         Ok(filter)
     }
+}
+
+/// Refuses numbers that no filter leaves, in rows of `columns`: the next frame's squares would not be finite.
+fn check_numbers<T: SimdReal>(name: &str, values: &[T], columns: usize) -> std::result::Result<(), String> {
+    let max = if size_of::<T>() == 4 { f64::from(f32::MAX) } else { f64::MAX }.sqrt();
+    let is_variance = |column: usize| name == "covariance" && (0..N).any(|k| packed(k, k) == column);
+    for (at, value) in values.iter().map(|value| value.to_f64()).enumerate() {
+        let least = if is_variance(at % columns) || name == "noise_scale" { 0.0 } else { -max };
+        if !(least..=max).contains(&value) {
+            return Err(format!("array '{name}' holds {value:e}, expected numbers from {least:e} to {max:e}"));
+        }
+    }
+    Ok(())
 }
 
 /// The header, if it is one of this version.

@@ -11,8 +11,9 @@ use crate::types::{AnyFrame, FlowField, Frame, Interval, Sample, Status, Units};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// Relative difference of the two steps of a triple above which its motion is that of the second step alone.
-const UNEVEN_STEPS: f64 = 0.01;
+/// Relative difference of the two steps of a triple above which its motion is that of the second step alone:
+/// a lost frame doubles a step, clocks of cameras jitter by some per cent.
+const UNEVEN_STEPS: f64 = 0.2;
 
 /// What the frames of a stream pass through, checked.
 #[derive(Debug, Clone)]
@@ -92,7 +93,8 @@ impl<T: SimdReal> FlowStream<T> {
     }
 
     /// As [`push`](Self::push), for a frame taken at `time`, s: the field's frame period is that of its own
-    /// frames. Where the steps of a triple differ, the step to the next frame is estimated from its two frames.
+    /// frames. Where the steps of a triple differ, the step to the next frame is estimated from its two
+    /// frames.
     ///
     /// # Errors
     /// [`Error::Argument`] naming `frames` for a frame of another size, `time` for one not after that of the
@@ -206,7 +208,8 @@ impl<T: SimdReal> FlowStream<T> {
         self.fusion.as_ref().map(RecursiveFusion::state)
     }
 
-    /// Replaces the state by that of another stream with the same plan: its [`frames`](Self::frames) with their
+    /// Replaces the state by that of another stream with the same plan: its [`frames`](Self::frames) with
+    /// their
     /// [`times`](Self::times), [`pushed`](Self::pushed) and [`fused`](Self::fused).
     ///
     /// # Errors
@@ -232,7 +235,9 @@ impl<T: SimdReal> FlowStream<T> {
             (Some(before), Some(after)) => (before - after).abs() > UNEVEN_STEPS * after,
             _ => false,
         };
-        let mut field = match self.plan.pair_estimator.as_ref().filter(|_| is_uneven) {
+        // A frame without a finite sample is as good as lost.
+        let is_alone = is_uneven || !frames[0].data().iter().any(|value| value.finite());
+        let mut field = match self.plan.pair_estimator.as_ref().filter(|_| is_alone) {
             Some(pair) => estimate_pooled(pair, &frames[reference..], first + reference)?,
             None => estimate_pooled(&self.plan.estimator, &frames, first)?,
         };

@@ -52,6 +52,16 @@ impl GreyLevels {
         if self.float != 1.0 && frames.iter().any(holds_levels) { Self { float: 1.0 } } else { self }
     }
 
+    /// As they were, from what [`GreyLevels::float_gain`] returned.
+    pub fn of_floats(gain: f64) -> Self {
+        Self { float: gain }
+    }
+
+    /// What floats are multiplied by.
+    pub fn float_gain(self) -> f64 {
+        self.float
+    }
+
     /// What the samples of a frame are multiplied by.
     pub fn gain(&self, frame: &AnyFrame) -> f64 {
         match frame {

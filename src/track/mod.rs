@@ -6,11 +6,13 @@
 //!   other's predictions.
 //! * [`StereoTracker`]: all moving objects before a pair of cameras; takes pairs of views, no boxes.
 //!
-//! `tracker` has the trait; `grey_levels` brings frames to the scale of the thresholds.
+//! `tracker` has the trait; `grey_levels` brings frames to the scale of the thresholds; `persist` keeps
+//! trackers as bytes.
 
 pub mod gradient;
 mod grey_levels;
 pub mod particle;
+mod persist;
 pub mod stereo;
 mod tracker;
 

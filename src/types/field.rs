@@ -1,7 +1,7 @@
 //! The result of an estimator: planes of motion parameters, their covariance and their status.
 
 use super::{AffineFlow, Interval, MOTION_NAMES, SamplingGrid, Status, Units};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_memory};
 use crate::math::Real;
 use std::borrow::Cow;
 
@@ -115,6 +115,9 @@ impl<T: Real> FlowField<T> {
     fn of(layout: FieldLayout, covariance: bool, value: T) -> Result<Self> {
         let (width, height) = layout.sites.shape(layout.frame_size)?;
         let (n, p) = (width * height, layout.parameters.len());
+        // The covariance is the largest part of all that an estimator holds.
+        let values = if covariance { p * (p + 1) / 2 } else { p };
+        check_memory("frames", n.checked_mul(values * size_of::<T>()))?;
         Ok(Self {
             width,
             height,
@@ -156,7 +159,9 @@ impl<T: Real> FlowField<T> {
         let scale: Vec<f64> = self.layout.parameters.iter().map(factor).collect();
         let by = |plane: &mut [T], factor: f64| {
             if factor != 1.0 {
-                plane.iter_mut().for_each(|value| *value *= T::from_f64(factor));
+                for value in plane {
+                    *value *= T::from_f64(factor);
+                }
             }
         };
         self.motion.chunks_mut(n).zip(&scale).for_each(|(plane, &factor)| by(plane, factor));

@@ -5,10 +5,31 @@ use crate::math::Real;
 
 /// A grey image: `height` rows of `width` samples, row-major, `[row, col] = [y, x]`, x right and y down.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(try_from = "Unchecked<T>"))]
 pub struct Frame<T> {
     width: usize,
     height: usize,
     data: Vec<T>,
+}
+
+/// Largest integer below which float64 holds every integer.
+pub const LARGEST_EXACT_INTEGER: u64 = 1 << 53;
+/// A frame as it is read: any number of samples.
+#[cfg(feature = "serde")]
+#[derive(serde::Deserialize)]
+struct Unchecked<T> {
+    width: usize,
+    height: usize,
+    data: Vec<T>,
+}
+
+#[cfg(feature = "serde")]
+impl<T> TryFrom<Unchecked<T>> for Frame<T> {
+    type Error = Error;
+
+    fn try_from(read: Unchecked<T>) -> Result<Self> {
+        Self::new(read.width, read.height, read.data)
+    }
 }
 
 /// Which pixels may be used: `true` is used.
@@ -173,6 +194,7 @@ macro_rules! any_frame {
     ($(#[$doc:meta] $name:ident($frame:ident))*) => {$(
         #[$doc]
         #[derive(Debug, Clone, PartialEq)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         pub enum $name {
             /// 8-bit samples.
             U8($frame<u8>),

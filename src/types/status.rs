@@ -2,8 +2,8 @@
 
 use super::choices;
 
-/// The state of one estimate. `Border`, `NonFinite`, `Masked`, `Unobservable` and `MissingFrame` come with NaN
-/// values.
+/// The state of one estimate. `Border`, `NonFinite`, `Masked`, `Unobservable` and `MissingFrame` come with
+/// NaN values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 #[repr(u8)]
 pub enum Status {

@@ -1,6 +1,7 @@
 //! State of a tracked target, frame by frame.
 
 use super::choices;
+use std::borrow::Cow;
 
 /// A rectangle with real sides, px: its upper left corner is `(x, y)`, pixel centres lie at integers, so that
 /// its centre is `(x + width / 2, y + height / 2)`.
@@ -72,9 +73,8 @@ pub struct TrackState {
     pub frame: usize,
     /// Status of the target.
     pub status: TrackStatus,
-    /// Reason for the status, in a few words; may be empty. Not part of a serialised state.
-    #[cfg_attr(feature = "serde", serde(skip))]
-    pub reason: &'static str,
+    /// Reason for the status, in a few words; may be empty.
+    pub reason: Cow<'static, str>,
     /// Whether this is the first measurement after the target was lost or out of the picture.
     pub reacquired: bool,
     /// Filtered position of the target's centre, px.
@@ -113,7 +113,7 @@ impl TrackState {
         Self {
             frame: 0,
             status: TrackStatus::Tracking,
-            reason: "",
+            reason: "".into(),
             reacquired: false,
             position,
             velocity: [0.0; 2],

@@ -36,13 +36,13 @@ fn field(noise: f64, claimed: f64, seed: u64) -> FlowField<f64> {
     field
 }
 
-fn fit(field: &FlowField<f64>) -> RegionMotion {
+fn fitted(field: &FlowField<f64>) -> RegionMotion {
     fit_region(field, None, None).unwrap()
 }
 
 #[test]
 fn an_affine_region_is_recovered_exactly() {
-    let fit = fit(&field(0.0, 0.01, 1));
+    let fit = fitted(&field(0.0, 0.01, 1));
     assert_eq!((fit.centre, fit.count, fit.sites), ((20.0, 10.0), 66, 66));
     for (got, want) in fit.motion.iter().zip(TRUTH) {
         assert!((got - want).abs() < 1e-9, "{got} {want}");
@@ -53,7 +53,7 @@ fn an_affine_region_is_recovered_exactly() {
 fn normalised_errors_have_the_size_they_should() {
     let mut nees = 0.0;
     for seed in 0..200 {
-        let fit = fit(&field(0.05, 0.05, seed));
+        let fit = fitted(&field(0.05, 0.05, seed));
         let error = Vector6::from(fit.motion) - Vector6::from(TRUTH);
         let covariance = Matrix6::from(fit.covariance);
         nees += (error.transpose() * covariance.try_inverse().unwrap() * error)[0] / 200.0;
@@ -63,12 +63,12 @@ fn normalised_errors_have_the_size_they_should() {
 
 #[test]
 fn scatter_and_shared_windows_enlarge_the_deviation() {
-    let honest = fit(&field(0.05, 0.05, 3)).covariance[2][2];
-    let boastful = fit(&field(0.05, 0.005, 3)).covariance[2][2];
+    let honest = fitted(&field(0.05, 0.05, 3)).covariance[2][2];
+    let boastful = fitted(&field(0.05, 0.005, 3)).covariance[2][2];
     assert!((0.5..2.0).contains(&(boastful / honest)), "{}", boastful / honest);
     let mut overlapping = field(0.05, 0.05, 3);
     overlapping.layout.correlation_length = 4.0;
-    let overlapping = fit(&overlapping).covariance[2][2];
+    let overlapping = fitted(&overlapping).covariance[2][2];
     assert!(overlapping > 10.0 * honest);
 }
 
@@ -78,11 +78,11 @@ fn what_is_claimed_and_does_not_scatter_is_common() {
     let mut biased = field(0.001, 0.05, 3);
     let n = biased.len();
     biased.motion[..n].iter_mut().for_each(|u| *u += 0.05);
-    let fit = fit(&biased);
+    let fit = fitted(&biased);
     let (error, deviation) = (fit.motion[0] - TRUTH[0], fit.covariance[0][0].sqrt());
     assert!((error - 0.05).abs() < 1e-3 && (0.8..1.1).contains(&(error / deviation)), "{error} {deviation}");
     // Errors that scatter as claimed have nothing in common.
-    let honest = fit(&field(0.05, 0.05, 3)).covariance[0][0].sqrt();
+    let honest = fitted(&field(0.05, 0.05, 3)).covariance[0][0].sqrt();
     assert!(honest < 0.25 * deviation, "{honest} {deviation}");
 }
 
@@ -90,7 +90,7 @@ fn what_is_claimed_and_does_not_scatter_is_common() {
 fn too_few_sites_give_nan_not_a_guess() {
     let mut none = field(0.0, 0.01, 1);
     none.status.fill(Status::Border);
-    let fit = fit(&none);
+    let fit = fitted(&none);
     assert!(fit.motion.iter().all(|value| value.is_nan()) && fit.count == 0 && fit.valid_share() == 0.0);
     assert_eq!(fit.status, RegionStatus::TooFewSites);
     let mut bare = field(0.0, 0.01, 1);
@@ -112,10 +112,10 @@ fn two_motions(edge: usize) -> FlowField<f64> {
 }
 
 #[test]
-fn the_motion_of_most_sites_is_found_and_that_of_a_seed() {
+fn the_motion_of_most_sites_is_found_and_that_around_a_pixel() {
     let curl = |found: &RegionMotion, field: &FlowField<f64>| measure(field, Quantity::Curl, found).unwrap();
     let mostly = two_motions(4);
-    let found = fit(&mostly);
+    let found = fitted(&mostly);
     let (value, std) = curl(&found, &mostly);
     assert_eq!((found.status, found.count), (RegionStatus::Ok, 42));
     assert!((value - 0.04).abs() < 4.0 * std && std < 0.002, "{value} {std}");
@@ -131,11 +131,11 @@ fn without_a_dominant_motion_there_is_no_value() {
     // A third motion for one column: none has half of the sites.
     let (n, width) = (halves.len(), halves.width);
     (0..n).filter(|site| site % width == 5).for_each(|site| halves.motion[site] += 5.0);
-    let found = fit(&halves);
+    let found = fitted(&halves);
     assert_eq!(found.status, RegionStatus::NoDominantMotion);
     assert!(found.motion[0].is_nan() && found.share() < 0.5, "{}", found.share());
     let outside = fit_region(&halves, None, Some((-1.0, 3.0))).unwrap_err().to_string();
-    assert!(outside.starts_with("seed: "), "{outside}");
+    assert!(outside.starts_with("at: "), "{outside}");
 }
 
 #[test]
@@ -143,5 +143,5 @@ fn a_motion_that_few_estimates_follow_is_none() {
     // Of all sites but five the frames contradict the estimate.
     let mut doubtful = field(0.02, 0.02, 5);
     doubtful.status[5..].fill(Status::Inconsistent);
-    assert_eq!(fit(&doubtful).status, RegionStatus::NoDominantMotion);
+    assert_eq!(fitted(&doubtful).status, RegionStatus::TooFewSites);
 }

@@ -131,7 +131,7 @@ fn noise_adds_nothing_to_a_length() {
     let mut covariance = [[0.0; 6]; 6];
     (covariance[0][0], covariance[1][1]) = (0.04, 0.04);
     let n = 4000u64;
-    let mean_square = |of: &dyn Fn(Quantity, &Motion<'_>) -> (f64, Option<f64>)| -> f64 {
+    let mean_square = |of: fn(Quantity, &Motion<'_>) -> (f64, Option<f64>)| -> f64 {
         let square = |k: u64| {
             let drawn = [0.5 + 0.2 * rng.normal(2 * k), 0.2 * rng.normal(2 * k + 1), 0.0, 0.0, 0.0, 0.0];
             of(Quantity::Speed, &Motion { covariance: Some(covariance), ..motion(drawn, &units) }).0.powi(2)
@@ -139,6 +139,6 @@ fn noise_adds_nothing_to_a_length() {
         (0..n).map(square).sum::<f64>() / n as f64
     };
     // 0.25 of the motion; noise adds 0.08.
-    assert!((mean_square(&value_and_std) - 0.33).abs() < 0.01);
-    assert!((mean_square(&unbiased_value_and_std) - 0.25).abs() < 0.015);
+    assert!((mean_square(value_and_std) - 0.33).abs() < 0.01);
+    assert!((mean_square(unbiased_value_and_std) - 0.25).abs() < 0.015);
 }

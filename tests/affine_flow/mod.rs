@@ -9,7 +9,7 @@ use jacoflow::jet::{Neighbourhood, TimeScheme};
 use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
 use jacoflow::synth::{AffineTexture, RotatingRamp, Scene, Sensor};
-use jacoflow::types::{FlowField, Frame, Mask, Rect, SamplingGrid, Status};
+use jacoflow::types::{FlowField, Frame, Mask, Rect, SamplingGrid, Status, Units};
 use std::f64::consts::PI;
 
 mod advect;

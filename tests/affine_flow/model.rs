@@ -4,6 +4,7 @@ use jacoflow::Error;
 use jacoflow::flow::model::{Axis, ModelKind, ModelVisitor, MotionModel, Per};
 use jacoflow::jet::JetRates;
 use jacoflow::math::random::CounterRng;
+use jacoflow::types::Units;
 use nalgebra::{DMatrix, DVector};
 
 #[test]

@@ -94,7 +94,7 @@ fn rpm_of_a_disc_is_measured_within_its_deviation() {
     place.good("synth disc -o disc.y4m --frames 8 --size 128x128 --rate 60 --set rpm=10 --set fps=60 --noise 1");
     let ended = place.good("measure disc.y4m --quantity rpm,rotation_centre_x,divergence --region 44,44,40,40");
     let mut lines = ended.out.lines();
-    assert_eq!(lines.next(), Some("frame,time_s,x,y,quantity,value,std,unit,valid_share"));
+    assert_eq!(lines.next(), Some("frame,time_s,x,y,quantity,value,std,unit,share,valid_share,status"));
     let rows: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
     assert_eq!(rows.len(), 6 * 3);
     for row in &rows {
@@ -105,7 +105,8 @@ fn rpm_of_a_disc_is_measured_within_its_deviation() {
             _ => (0.0, 0.2, "1/s"),
         };
         assert!(std > 0.0 && (value - truth).abs() < 4.0 * std + allowance, "{row:?}");
-        assert_eq!((row[7], row[8]), (unit, "1"));
+        assert_eq!((row[7], row[9], row[10]), (unit, "1", "ok"));
+        assert!(row[8].parse::<f64>().unwrap() > 0.95, "{row:?}");
     }
     assert!((rows[0][1].parse::<f64>().unwrap() - 1.0 / 60.0).abs() < 1e-9);
 }
@@ -120,8 +121,68 @@ fn time_to_contact_counts_down() {
         let cells: Vec<&str> = line.split(',').collect();
         let truth = 50.0 - (row + 1) as f64;
         let value: f64 = cells[5].parse().unwrap();
-        assert!((value / truth - 1.0).abs() < 0.08 && cells[7] == "frame", "{line}");
+        let std: f64 = cells[6].parse().unwrap();
+        assert!((value - truth).abs() < 4.0 * std && std < 0.02 * truth && cells[7] == "frame", "{line}");
     }
+}
+
+#[test]
+fn regions_of_every_kind_are_measured() {
+    let place = Place::new();
+    place.good("synth disc -o disc.y4m --frames 3 --size 128x128 --rate 60 --set rpm=10 --set fps=60 --set disc_radius=40 --noise 1");
+    for (region, least) in [
+        ("--region 44,44,40,40", 0.95),
+        ("--disc 63.5,63.5,25", 0.95),
+        ("--polygon 44,44,84,44,84,84,44,84", 0.95),
+        ("--at 64,64", 0.1),
+    ] {
+        let ended = place.good(&format!("measure disc.y4m --quantity rpm {region}"));
+        let row: Vec<&str> = ended.out.lines().nth(1).unwrap().split(',').collect();
+        let (value, std, share): (f64, f64, f64) =
+            (row[5].parse().unwrap(), row[6].parse().unwrap(), row[8].parse().unwrap());
+        assert!((value - 10.0).abs() < 4.0 * std + 0.1 && share > least && row[10] == "ok", "{region}: {row:?}");
+    }
+    for (wrong, words) in [
+        ("--disc 1,2", "X,Y,RADIUS"),
+        ("--polygon 1,2,3,4", "three corners"),
+        ("--at 500,3", "at: expected a pixel"),
+        ("--disc 9,9,3 --points 4,4", "cannot be used with"),
+    ] {
+        let ended = place.line(&format!("measure disc.y4m --quantity rpm {wrong}"));
+        assert!(ended.code != 0 && ended.err.contains(words), "{wrong}: {}", ended.err);
+    }
+}
+
+#[test]
+fn double_frames_give_a_field_a_pair() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 4 --size 48x40");
+    place.good("flow s.npy -o out --pairs");
+    assert_eq!(place.names("out"), ["000000.npz", "000002.npz"]);
+    let odd = place.line("flow s.npy -o other --pairs --stop 3");
+    assert!(odd.code != 0 && odd.err.contains("frames: expected an even number"), "{}", odd.err);
+    let triple = place.line("flow s.npy -o other --pairs --method instantaneous");
+    assert!(
+        triple.code != 0 && triple.err.contains("pairs: expected a method that takes two frames"),
+        "{}",
+        triple.err
+    );
+}
+
+#[test]
+fn fields_of_a_known_rate_and_pitch_are_in_those_units() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 3 --size 48x40");
+    place.good("flow s.npy -o px.npz");
+    place.good("flow s.npy -o mm.npz --fps 50 --pixel-pitch 0.02 --length-unit mm");
+    let read = |name: &str| read_npz::<f64>(place.path(name)).unwrap().field;
+    let (px, mm) = (read("px.npz"), read("mm.npz"));
+    assert_eq!(mm.layout.units.of_parameter("u"), "mm/s");
+    let site = 20 * 48 + 24;
+    assert!((mm.affine(site).u / px.affine(site).u - 1.0).abs() < 1e-5, "{} {}", mm.affine(site).u, px.affine(site).u);
+    assert!((mm.affine(site).u_x / px.affine(site).u_x / 50.0 - 1.0).abs() < 1e-5);
+    let info = place.good("info mm.npz --json").json();
+    assert_eq!(info["units"]["v_y"], "1/s");
 }
 
 #[test]

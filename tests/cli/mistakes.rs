@@ -198,3 +198,42 @@ fn files_are_named_as_they_were_asked_for() {
         assert!(ended.code == 2 && ended.err.contains(&format!("the file {name} ")), "{}", ended.err);
     }
 }
+
+#[test]
+fn what_is_read_is_never_replaced() {
+    let place = Place::new();
+    place.good("synth affine -o left --frames 2 --size 40x32");
+    let picture = place.path("a.png");
+    fs::copy(place.path("left/frame_000000.png"), &picture).unwrap();
+    let whole = fs::read(&picture).unwrap();
+    for line in [
+        "flow a.png a.png -o a.png --force",
+        "flow a.png a.png -o . --force --format kitti",
+        "filter left -o left --force",
+        "stereo a.png a.png -o a.png --force",
+        "stereo left/*.png left -o left/ --force",
+        "flow left/*.png -o left --force",
+        "egomotion left --intrinsics 40,40,20,16 -o left/frame_000000.png --force",
+    ] {
+        let ended = place.line(line);
+        assert!(ended.code != 0 && ended.err.contains("output: expected"), "{line}: {}", ended.err);
+    }
+    assert_eq!(fs::read(&picture).unwrap(), whole);
+    assert_eq!(place.names("left"), ["frame_000000.png", "frame_000001.png"]);
+}
+
+#[test]
+fn scenes_without_end_are_refused() {
+    let place = Place::new();
+    fails(&place, "synth waves -o w --set speed=1e300", 2, &["speed: expected at most 16 wavelengths a frame"]);
+}
+
+#[test]
+fn points_go_into_one_file_and_states_into_a_new_folder() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 3 --size 40x32");
+    place.good("flow s.npy -o x.npz --points 5,5 --time-scheme central");
+    assert!(place.good("info x.npz").out.contains("width"));
+    place.good("filter s.npy -o new/ --save-state new/s.npz");
+    assert!(place.names("new").contains(&"s.npz".into()));
+}

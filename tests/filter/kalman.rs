@@ -147,15 +147,28 @@ fn linear_filter_equals_filterpy() {
 }
 
 #[test]
-fn a_missing_measurement_leaves_its_state_alone() {
-    let mut filter = UnscentedFilter::new(2, 4, 2, SigmaPoints::default()).unwrap();
+fn of_a_measurement_the_components_that_are_there_are_used() {
+    let mut filter = UnscentedFilter::new(3, 4, 2, SigmaPoints::default()).unwrap();
     set_up(&mut filter);
     filter.predict(travel).unwrap();
     let before = filter.clone();
-    filter.update(&[5.2, 0.9, 5.2, f64::NAN], sight).unwrap();
-    assert_ne!(filter.x[..4], before.x[..4]);
-    assert_eq!((&filter.x[4..], &filter.P[16..]), (&before.x[4..], &before.P[16..]));
-    assert_eq!((filter.y[2], filter.log_likelihood[1]), (0.0, 0.0));
+    filter.update(&[5.2, 0.9, 5.2, f64::NAN, f64::NAN, f64::NAN], sight).unwrap();
+    assert_eq!((&filter.x[8..], &filter.P[32..]), (&before.x[8..], &before.P[32..]), "nothing was measured");
+    assert_eq!((filter.y[5], filter.log_likelihood[2], filter.mahalanobis[2]), (0.0, 0.0, 0.0));
+    // The range alone, as a filter of one measured number.
+    let mut range = UnscentedFilter::new(1, 4, 1, SigmaPoints::default()).unwrap();
+    (range.x, range.P) = (before.x[..4].to_vec(), before.P[..16].to_vec());
+    (range.Q, range.R) = (diagonal(&Q), vec![R[0]]);
+    range
+        .update(&[5.2], |points, out| {
+            points.chunks_exact(4).zip(out).for_each(|(p, z)| *z = p[0].hypot(p[1]));
+            Ok(())
+        })
+        .unwrap();
+    assert_eq!((&filter.x[4..8], &filter.P[16..32]), (&range.x[..], &range.P[..]));
+    assert_eq!((filter.y[2], filter.y[3], filter.S[4]), (range.y[0], 0.0, range.S[0]));
+    assert_eq!(filter.log_likelihood[1], range.log_likelihood[0]);
+    assert_ne!(filter.x[..4], filter.x[4..8]);
 }
 
 #[test]

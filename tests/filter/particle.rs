@@ -210,7 +210,7 @@ fn wrong_arguments_are_named_and_change_nothing() {
     let nan = f64::NAN;
     let failures = [
         (filter.predict_linear(&F[..3], &Q), "F: expected 4 values"),
-        (filter.predict_linear(&[nan; 4], &Q), "F: expected a matrix of finite"),
+        (filter.predict_linear(&[nan; 4], &Q), "F: expected finite numbers"),
         (filter.predict_linear(&F, &[1.0, 2.0, 2.0, 1.0]), "Q: expected a symmetric positive"),
         (filter.predict_linear(&[1e308; 4], &Q), "numerical failure: x of set 0"),
         (

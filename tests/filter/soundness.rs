@@ -1,7 +1,9 @@
-//! What is refused, and what is mended.
+//! What is refused, what is repaired, and which states fail.
+
+#![allow(non_snake_case, reason = "P is the literature's name")]
 
 use jacoflow::error::Error;
-use jacoflow::filter::{KalmanFilter, SigmaPoints, UnscentedFilter};
+use jacoflow::filter::{ExtendedFilter, KalmanFilter, SigmaPoints, UnscentedFilter};
 
 #[test]
 fn a_lost_covariance_is_mended_and_counted() {
@@ -93,4 +95,99 @@ fn sizes_beyond_memory_are_refused_by_name() {
     let points = SigmaPoints::default();
     assert!(UnscentedFilter::new(1, 5000, 1, points).unwrap_err().to_string().starts_with("dim_x"));
     assert!(points.sigma_points(&[f64::NAN], &[1.0]).unwrap_err().to_string().starts_with('x'));
+}
+
+/// Least eigenvalue of the correlations of `(n, n)` matrices; variances must not be negative.
+fn least_correlation(P: &[f64], n: usize) -> f64 {
+    let of_one = |P: &[f64]| {
+        let scale: Vec<f64> = (0..n).map(|k| P[k * (n + 1)].sqrt()).collect();
+        assert!(scale.iter().all(|v| *v > 0.0), "{P:?}");
+        let correlation = nalgebra::DMatrix::from_fn(n, n, |i, j| P[i * n + j] / scale[i] / scale[j]);
+        correlation.symmetric_eigenvalues().min()
+    };
+    P.chunks_exact(n * n).map(of_one).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn covariances_stay_definite_however_far_apart_the_noises_are() {
+    let step = |p: &[f64], out: &mut [f64]| {
+        p.chunks_exact(2).zip(out.chunks_exact_mut(2)).for_each(|(p, q)| q.copy_from_slice(&[p[0] + p[1], p[1]]));
+        Ok(())
+    };
+    let first = |p: &[f64], out: &mut [f64]| {
+        p.chunks_exact(2).zip(out).for_each(|(p, z)| *z = p[0]);
+        Ok(())
+    };
+    for (q, r, p0) in [(1e10, 1e-12, 1e12), (0.0, 1e-13, 1e6), (1e-12, 1e-6, 1e12), (1.0, 0.0, 1e6)] {
+        let mut unscented = UnscentedFilter::new(1, 2, 1, SigmaPoints::default()).unwrap();
+        let mut linear = KalmanFilter::new(1, 2, 1).unwrap();
+        (linear.F, linear.H) = (vec![1.0, 1.0, 0.0, 1.0], vec![1.0, 0.0]);
+        let mut extended = ExtendedFilter::new(1, 2, 1).unwrap();
+        for state in [&mut unscented.state, &mut linear.state, &mut extended.state] {
+            (state.Q, state.R) = (vec![q, 0.0, 0.0, q], vec![r]);
+            state.P = vec![p0, 0.0, 0.0, p0];
+        }
+        for t in 0..200 {
+            let z = [(0.1 * f64::from(t)).sin()];
+            unscented.predict(step).unwrap();
+            linear.predict().unwrap();
+            extended.predict_by_differences(step).unwrap();
+            unscented.update(&z, first).unwrap();
+            linear.update(&z).unwrap();
+            extended.update_by_differences(&z, first).unwrap();
+            for state in [&unscented.state, &linear.state, &extended.state] {
+                if r > 0.0 {
+                    let least = least_correlation(&state.P, 2);
+                    assert!(least > -1e-15, "Q {q} R {r} P0 {p0}, step {t}: {least}, {:?}", state.P);
+                }
+                assert!(state.P[0] >= 0.0 && state.P[3] >= 0.0, "{:?}", state.P);
+                assert_eq!((state.repairs, state.failed[0]), (0, false), "Q {q} R {r} P0 {p0}, step {t}");
+            }
+        }
+        let known = |state: &jacoflow::filter::GaussianState| (state.x[0] - (19.9f64).sin()).abs();
+        for state in [&unscented.state, &linear.state, &extended.state] {
+            assert!(q < 1.0 || known(state) < 1e-6, "{:?}", state.x);
+        }
+    }
+}
+
+#[test]
+fn a_state_that_fails_is_marked_and_the_batch_goes_on() {
+    let mut filter = UnscentedFilter::new(3, 2, 1, SigmaPoints::default()).unwrap();
+    filter.x[2] = 7.0;
+    let mut alone = UnscentedFilter::new(1, 2, 1, SigmaPoints::default()).unwrap();
+    let wild = |p: &[f64], out: &mut [f64]| {
+        // Seven is where the second state starts.
+        p.chunks_exact(2).zip(out.chunks_exact_mut(2)).for_each(|(p, q)| {
+            q.copy_from_slice(&[p[0] + p[1], if p[0] > 3.0 { f64::NAN } else { p[1] }]);
+        });
+        Ok(())
+    };
+    let first = |p: &[f64], out: &mut [f64]| {
+        p.chunks_exact(2).zip(out).for_each(|(p, z)| *z = p[0]);
+        Ok(())
+    };
+    filter.predict(wild).unwrap();
+    filter.update(&[0.1, f64::NAN, 0.1], first).unwrap();
+    alone.predict(wild).unwrap();
+    alone.update(&[0.1], first).unwrap();
+    assert_eq!(filter.failed, [false, true, false]);
+    assert_eq!((&filter.x[2..4], &filter.P[4..8]), (&[7.0, 0.0][..], &[1.0, 0.0, 0.0, 1.0][..]));
+    for (x, P) in filter.x.chunks(2).zip(filter.P.chunks(4)).step_by(2) {
+        assert_eq!((x, P), (&alone.x[..], &alone.P[..]));
+    }
+    // A singular S fails, too: nothing is known better than exactly.
+    filter.P[4..8].fill(0.0);
+    filter.R = vec![0.0];
+    filter.failed[1] = false;
+    filter.update(&[0.1, 7.0, 0.1], first).unwrap();
+    assert_eq!(filter.failed, [false, true, false]);
+    // When every state fails, the reason is reported and nothing changes.
+    let before = filter.clone();
+    let all = |_: &[f64], out: &mut [f64]| {
+        out.fill(f64::INFINITY);
+        Ok(())
+    };
+    assert!(filter.predict(all).unwrap_err().to_string().starts_with("fx"));
+    assert_eq!(filter, before);
 }

@@ -23,6 +23,7 @@ mod source_files;
 mod source_memory;
 mod source_npy;
 mod source_select;
+mod source_tiff;
 mod source_views;
 mod source_y4m;
 mod table;

@@ -53,3 +53,14 @@ proptest! {
         let _ = read_pfm(&path);
     }
 }
+
+#[test]
+fn scales_that_say_no_byte_order_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.pfm");
+    for scale in ["0", "-0.0", "nan", "inf", "-inf"] {
+        std::fs::write(&path, [format!("Pf\n1 1\n{scale}\n").as_bytes(), &[0; 4]].concat()).unwrap();
+        let message = read_pfm(&path).unwrap_err().to_string();
+        assert!(message.contains("its scale is") && message.contains("a.pfm"), "{message}");
+    }
+}

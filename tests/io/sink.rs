@@ -110,3 +110,19 @@ fn unlike_frames_and_unknown_outputs_are_refused_and_leave_nothing() {
     assert!(open_sink("a.avi", 25.0).err().unwrap().to_string().starts_with("output"));
     assert!(open_sink("-", 0.0).err().unwrap().to_string().starts_with("frame_rate"));
 }
+
+#[test]
+fn a_shorter_run_leaves_no_frames_of_a_longer_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path().join("frames");
+    let spec = place.to_str().unwrap();
+    for count in [3, 1] {
+        let mut sink = open_sink(spec, 25.0).unwrap();
+        for level in 0..count {
+            sink.write(&AnyFrame::U8(Frame::filled(4, 3, level as u8))).unwrap();
+        }
+        sink.finish().unwrap();
+        assert_eq!(std::fs::read_dir(&place).unwrap().count(), count);
+    }
+    assert!(open_sink("", 25.0).err().unwrap().to_string().contains("an empty name"));
+}

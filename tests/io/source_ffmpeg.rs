@@ -47,6 +47,31 @@ fn colour_is_asked_for_in_the_coding_that_is_read() {
 }
 
 #[test]
+fn times_are_those_that_the_program_writes() {
+    let script = r"printf 'frame:0 pts:0 pts_time:0\nx=1\nframe:1 pts:4 pts_time:0.25\nx=1\n' > times
+        printf 'YUV4MPEG2 W1 H1 F50:1 Cmono\nFRAME\na'; printf 'FRAME\nb'";
+    let (_folder, source) = open(script);
+    let mut source = source.unwrap();
+    assert_eq!(source.time(), None);
+    source.next_frame().unwrap();
+    assert_eq!(source.time(), Some(0.0));
+    source.next_frame().unwrap();
+    assert_eq!(source.time(), Some(0.25));
+    let (_folder, source) = open(r"printf 'YUV4MPEG2 W1 H1 F50:1 Cmono\nFRAME\na'; printf 'FRAME\nb'");
+    let mut source = source.unwrap();
+    assert_eq!(source.skip(2).unwrap(), 2);
+    assert_eq!(source.time(), Some(0.02));
+}
+
+#[test]
+fn an_older_program_without_times_is_asked_without() {
+    let script = r#"case "$*" in *direct=1*) echo "Option 'direct' not found" >&2; exit 1;; esac
+        printf 'YUV4MPEG2 W1 H1 Cmono\nFRAME\na'"#;
+    let (_folder, source) = open(script);
+    assert!(source.unwrap().next_frame().unwrap().is_some());
+}
+
+#[test]
 fn failures_carry_the_program_s_words() {
     let (_folder, source) = open("echo 'moov atom not found' >&2; exit 1");
     let message = source.unwrap_err().to_string();

@@ -100,15 +100,45 @@ fn grey_stacks_are_refused_where_colour_is_needed_or_repeated() {
 #[test]
 fn lies_about_the_size_are_found_before_anything_is_allocated() {
     let folder = tempfile::tempdir().unwrap();
-    for shape in
-        [vec![1 << 40, 3, 4], vec![3, 30_000, 30_000], vec![usize::MAX, 8, 8], vec![2, 3, 5], vec![7], vec![1, 1, 1, 2]]
-    {
-        let path = save(folder.path(), &NpyHeader::new(ElementType::F32, &shape), &[0f32; 24]);
-        let error = NpySource::open(&path, Colour::Luminance).unwrap_err();
-        assert!(matches!(error, Error::Format { .. }), "{shape:?}: {error}");
+    for shape in [
+        vec![1 << 40, 3, 4],
+        vec![3, 30_000, 30_000],
+        vec![usize::MAX, 8, 8],
+        vec![2, 3, 5],
+        vec![7],
+        vec![1, 1, 1, 2],
+        vec![usize::MAX - 99, 1, 1],
+    ] {
+        for fortran_order in [false, true] {
+            for element in [ElementType::U8, ElementType::F32] {
+                let header = NpyHeader { fortran_order, ..NpyHeader::new(element, &shape) };
+                let path = save(folder.path(), &header, &[0u8; 24]);
+                let error = NpySource::open(&path, Colour::Luminance).unwrap_err();
+                assert!(matches!(error, Error::Format { .. }), "{shape:?}: {error}");
+            }
+        }
     }
-    let path = save(folder.path(), &NpyHeader::new(ElementType::I64, &[1, 3, 4]), &[0i64; 12]);
-    assert!(NpySource::open(&path, Colour::Error).unwrap_err().to_string().contains("astype"));
+    let path = save(folder.path(), &NpyHeader::new(ElementType::Text(1), &[1, 3, 4]), &[65_u32; 12]);
+    assert!(NpySource::open(&path, Colour::Error).unwrap_err().to_string().contains("got text"));
+}
+
+#[test]
+fn other_numbers_become_the_type_that_holds_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let first = |path: PathBuf| NpySource::open(&path, Colour::Error).unwrap().next_frame();
+    let path = save(folder.path(), &NpyHeader::new(ElementType::I16, &[1, 1, 2]), &[-3_i16, 4]);
+    assert_eq!(first(path).unwrap(), Some(AnyFrame::F32(Frame::new(2, 1, vec![-3.0, 4.0]).unwrap())));
+    let path = save(folder.path(), &NpyHeader::new(ElementType::Bool, &[1, 2]), &[1_u8, 0]);
+    assert_eq!(first(path).unwrap(), Some(AnyFrame::U8(Frame::new(2, 1, vec![1, 0]).unwrap())));
+    let path = save(folder.path(), &NpyHeader::new(ElementType::U32, &[1, 2]), &[u32::MAX, 0]);
+    assert_eq!(first(path).unwrap(), Some(AnyFrame::F64(Frame::new(2, 1, vec![f64::from(u32::MAX), 0.0]).unwrap())));
+    // 1 and -2 as float16.
+    let path = save(folder.path(), &NpyHeader::new(ElementType::F16, &[1, 2]), &[0x3c00_u16, 0xc000]);
+    assert_eq!(first(path).unwrap(), Some(AnyFrame::F32(Frame::new(2, 1, vec![1.0, -2.0]).unwrap())));
+    let path = save(folder.path(), &NpyHeader::new(ElementType::I64, &[1, 2]), &[1_i64 << 53, 7]);
+    assert!(first(path).is_ok());
+    let path = save(folder.path(), &NpyHeader::new(ElementType::I64, &[1, 2]), &[(1_i64 << 53) + 1, 7]);
+    assert!(first(path).unwrap_err().to_string().contains("beyond 2^53"));
 }
 
 proptest! {
@@ -125,4 +155,21 @@ proptest! {
         let is_format_error = matches!(NpySource::open(&path, Colour::Error), Err(Error::Format { .. }));
         prop_assert!(is_format_error);
     }
+}
+
+/// A frame takes no more memory than its samples, and a pass over the file no more than its own frames.
+#[test]
+fn a_million_frames_of_one_pixel_come_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let count = 1_000_000;
+    let values: Vec<u16> = (0..count).map(|t| (t % 65_521) as u16).collect();
+    let header = NpyHeader { fortran_order: true, ..NpyHeader::new(ElementType::U16, &[count, 1, 1]) };
+    let path = save(folder.path(), &header, &values);
+    let mut source = NpySource::open(&path, Colour::Error).unwrap();
+    for &value in &values[..1000] {
+        assert_eq!(source.next_frame().unwrap().unwrap(), AnyFrame::U16(Frame::filled(1, 1, value)));
+    }
+    assert_eq!(source.skip(count - 1001).unwrap(), count - 1001);
+    assert_eq!(source.next_frame().unwrap().unwrap(), AnyFrame::U16(Frame::filled(1, 1, values[count - 1])));
+    assert!(source.next_frame().unwrap().is_none());
 }

@@ -12,7 +12,7 @@ fn numbered() -> TrackState {
     TrackState {
         frame: 4,
         status: TrackStatus::Occluded,
-        reason: "something, in front",
+        reason: "something, in front".into(),
         reacquired: true,
         position: [1.5, 2.5],
         velocity: [3.5, 4.5],

@@ -23,6 +23,7 @@ mod rotation_prior;
 mod scenes;
 mod statuses;
 mod time_to_contact;
+mod unknown_directions;
 
 // The scenes name them by their place in the crate, whose unit tests share them.
 use jacoflow::types::{FieldLayout, FlowField, Interval, MOTION_NAMES, SamplingGrid, Units};

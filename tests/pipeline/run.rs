@@ -15,7 +15,7 @@ impl Stage<f32> for Means {
     fn frames_needed(&self) -> usize {
         2
     }
-    fn push(&mut self, frame: AnyFrame) -> Result<Option<Output<f32>>> {
+    fn push(&mut self, frame: AnyFrame, _time: Option<f64>) -> Result<Option<Output<f32>>> {
         self.0 += 1;
         let frame = Arc::new(frame.to_real::<f32>());
         let layout = FieldLayout {
@@ -77,7 +77,7 @@ fn source(sizes: &[usize]) -> Box<dyn FrameSource> {
 fn fields_are_numbered_as_the_input_and_counted() {
     let kept = Collect::default();
     let fields = kept.handle();
-    let numbering = Numbering { start: 10, step: 3, rate: Some(30.0) };
+    let numbering = Numbering { start: 10, step: 3, rate: Some(30.0), ..Numbering::default() };
     let mut pipeline =
         Pipeline::new(Box::new(Means(0))).with_numbering(numbering).with_sinks([Box::new(kept) as Box<FieldSink<f32>>]);
     let frames = (1..=4).map(|v| AnyFrame::U8(Frame::filled(2, 2, v))).collect();
@@ -88,6 +88,14 @@ fn fields_are_numbered_as_the_input_and_counted() {
     let summary = pipeline.summary();
     assert_eq!((summary.frames, summary.fields, summary.valid_share()), (4, 3, 0.25));
     assert_eq!((numbering.period(), numbering.time(30)), (Some(0.1), Some(1.0)));
+}
+
+#[test]
+fn times_of_the_source_replace_those_of_the_rate() {
+    let own = Numbering { step: 2, rate: Some(10.0), ..Numbering::default() };
+    assert_eq!((own.time_of(4, Some(0.7)), own.time_of(4, None)), (Some(0.7), Some(0.4)));
+    let given = Numbering { has_own_times: false, ..own };
+    assert_eq!(given.time_of(4, Some(0.7)), Some(0.4));
 }
 
 #[test]

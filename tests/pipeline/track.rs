@@ -71,7 +71,7 @@ fn into(folder: &Path) -> Vec<Box<TrackSink>> {
 #[test]
 fn every_target_has_a_row_a_frame_numbered_as_in_the_input() {
     let folder = tempfile::tempdir().unwrap();
-    let mut run = TrackRun::default().with_numbering(Numbering { start: 5, step: 2, rate: None });
+    let mut run = TrackRun::default().with_numbering(Numbering { start: 5, step: 2, ..Numbering::default() });
     run.run(source(&[10, 20, 30, 40]), begin(into(folder.path())), &Silent).unwrap();
     let summary = run.summary();
     assert_eq!((summary.frames, summary.targets.len(), summary.files), (4, 2, 6));

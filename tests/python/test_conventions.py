@@ -100,8 +100,8 @@ def test_memory_layout_does_not_matter(method, texture):
     }
     for name, frames in variants.items():
         before = [np.array(frame) for frame in frames]
-        field = jacoflow.estimate(frames, method=method, diagnostics=True)
-        assert_same(field[0] if "stack" in name else field, reference)
+        field = jacoflow.estimate(frames, method=method, diagnostics=True, ends="drop")
+        assert_same(field[0], reference)
         for now, then in zip(frames, before, strict=True):
             assert_array_equal(now, then, err_msg=f"{name}: the input was changed")
 

@@ -2,6 +2,7 @@
 
 import errno
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,27 +17,25 @@ GOOD = np.zeros((3, 8, 10), np.uint8)
 @pytest.mark.parametrize(
     ("frames", "error", "message"),
     [
-        (GOOD[:2], ValueError, "frames: expected at least 3 frames, got 2 frames"),
-        (GOOD[:0], ValueError, "frames: expected at least 3 frames, got 0 frames"),
+        (GOOD[:1], ValueError, "frames: expected at least [23] frames, got 1 frame"),
+        (GOOD[:0], ValueError, "frames: expected at least [23] frames, got 0 frames"),
         ([], ValueError, "frames: expected at least [23] frames, got 0 frames"),
-        (list(GOOD[:1]), ValueError, "frames: expected at least [23] frames, got 1 frames"),
-        (GOOD[0], ValueError, r"frames: expected a list of frames \(H, W\) or a stack \(T, H, W\), got an array of shape \[8, 10\]"),
+        (list(GOOD[:1]), ValueError, "frames: expected at least [23] frames, got 1 frame"),
+        (GOOD[0], ValueError, r"frames: expected a list of frames \(H, W\) or a stack \(T, H, W\), got an array of shape \(8, 10\)"),
         (GOOD[:, :2], ValueError, "frames: expected at least 3 x 3 pixels, got 10 x 2"),
         (GOOD[:, :, :1], ValueError, "frames: expected at least 3 x 3 pixels"),
         (GOOD[:, :0], ValueError, "frames: expected at least 3 x 3 pixels"),
         ([GOOD[0], GOOD[1], GOOD[2, :7]], ValueError, "frames: expected frames of one size"),
         ([GOOD[0], GOOD[1], GOOD[2].astype(np.uint16)], TypeError, "frames: expected uint8 like the first frame, got uint16"),
-        (GOOD.astype(np.int32), TypeError, "frames: expected an array of uint8, uint16, float32 or float64, got int32"),
-        (GOOD.astype(bool), TypeError, "frames: .* got bool"),
-        (GOOD.astype(complex), TypeError, "frames: .* got complex128"),
-        (GOOD.astype(np.float16), TypeError, "frames: .* got float16"),
+        (GOOD.astype(complex), TypeError, "frames: expected an array of bool, integers of 8 to 64 bits, float16, float32 or float64, got complex128"),
+        (GOOD.astype(np.int64) + 2**54, ValueError, r"frames: expected integers of at most 2\^53, which float64 holds exactly, got .* \(int64\)"),
         (GOOD.astype(object), TypeError, "frames: .* got object"),
         (np.zeros((3, 8, 10, 3), np.uint8), ValueError, 'frames: .*colour="luminance"'),
         (np.zeros((8, 10, 3), np.uint8), ValueError, "frames: .*looks like one colour image"),
         ([np.zeros((8, 10, 3), np.uint8)] * 3, ValueError, r'frames: .*convert it with jacoflow.luminance.frame.*colour="luminance"'),
-        ([np.zeros((8, 10, 2), np.uint8)] * 3, ValueError, r"frames: expected a frame \(H, W\), got shape \[8, 10, 2\]"),
-        (np.ma.masked_array(GOOD, GOOD == 1), TypeError, "frames: expected a plain array, got a masked one"),
-        ("frames", TypeError, "frames|array"),
+        ([np.zeros((8, 10, 2), np.uint8)] * 3, ValueError, r"frames: expected a frame \(H, W\), got shape \(8, 10, 2\)"),
+        ("clip.mp4", TypeError, r"frames: expected an array, got the name of a file \(clip.mp4\); open it with jacoflow.io.frames\(path\)"),
+        (Path("clip.mp4"), TypeError, r"frames: expected an array, got the name of a file \(clip.mp4\)"),
         (None, TypeError, "frames|array|object"),
     ],
 )
@@ -112,7 +111,7 @@ def test_progress_of_a_wrong_kind(progress):
         ({"profile": "best"}, ValueError, "profile: "),
         ({"form": "square"}, ValueError, "form: "),
         ({"transition": "euler"}, ValueError, "transition: "),
-        ({"Q": [1.0, 2.0]}, ValueError, r"Q: expected twelve numbers, shape \(12,\), got shape \[2\]"),
+        ({"Q": [1.0, 2.0]}, ValueError, r"Q: expected twelve numbers, shape \(12,\), got shape \(2,\)"),
         ({"Q": [-1.0] * 12}, ValueError, "Q: "),
         ({"Q": ["a"] * 12}, TypeError, "Q: expected real numbers"),
         ({"R": 0.0}, ValueError, "R: "),
@@ -138,7 +137,7 @@ def test_a_stream_refuses_a_frame_unlike_the_first_and_goes_on(make):
     for bad, error in (
         (frames[2][:20], ValueError),
         (frames[2].astype(np.float32), TypeError),
-        (frames[2].astype(int), TypeError),
+        (frames[2].astype(np.int16), TypeError),
         (frames, ValueError),
     ):
         with pytest.raises(error, match="frame"):
@@ -282,7 +281,7 @@ def test_noise_that_no_covariance_can_hold_is_refused(method):
 
 @pytest.mark.parametrize(("method", "needed"), [("coarse_to_fine", 2), ("windowed", 2), ("lucas_kanade", 2), ("instantaneous", 3)])
 def test_a_lone_frame_names_how_many_suffice(method, needed):
-    with pytest.raises(ValueError, match=f"frames: expected at least {needed} frames, got 1 frames"):
+    with pytest.raises(ValueError, match=f"frames: expected at least {needed} frames, got 1 frame"):
         jacoflow.estimate([GOOD[0]], method=method)
 
 

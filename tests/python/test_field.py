@@ -3,18 +3,29 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.linalg import logm
 
 import jacoflow
 from jacoflow import FlowField, Status, scenes
 
+
+def rate(m):
+    """The rate of the motion that makes the step, [[L_xx, L_xy], [L_yx, L_yy]], 1/frame."""
+    return logm(np.eye(2) + np.array([[m[2], m[4]], [m[3], m[5]]])).real
+
+
+def of_rate(formula):
+    return lambda m: formula(*rate(m).ravel())
+
+
 QUANTITIES = {
-    "divergence": lambda m: m[2] + m[5],
-    "curl": lambda m: m[3] - m[4],
-    "shear_magnitude": lambda m: np.hypot(m[2] - m[5], m[4] + m[3]),
-    "shear_axis": lambda m: 0.5 * np.arctan2(m[4] + m[3], m[2] - m[5]),
-    "angular_velocity": lambda m: 0.5 * (m[3] - m[4]),
+    "divergence": of_rate(lambda xx, xy, yx, yy: xx + yy),
+    "curl": of_rate(lambda xx, xy, yx, yy: yx - xy),
+    "shear_magnitude": of_rate(lambda xx, xy, yx, yy: np.hypot(xx - yy, xy + yx)),
+    "shear_axis": of_rate(lambda xx, xy, yx, yy: 0.5 * np.arctan2(xy + yx, xx - yy)),
+    "angular_velocity": of_rate(lambda xx, xy, yx, yy: 0.5 * (yx - xy)),
     "speed": lambda m: np.hypot(m[0], m[1]),
-    "time_to_contact": lambda m: 2 / (m[2] + m[5]),
+    "time_to_contact": of_rate(lambda xx, xy, yx, yy: 1 / (1 - np.exp(-(xx + yy) / 2))),
     "centre_distance": lambda m: np.linalg.norm(np.linalg.solve([[m[2], m[4]], [m[3], m[5]]], m[:2])),
 }
 NAMES = ("u", "v", "u_x", "v_x", "u_y", "v_y")
@@ -151,10 +162,10 @@ def test_frame_rate_and_pixel_pitch_scale_results():
     plain = jacoflow.flow(*frames)
     scaled = jacoflow.flow(*frames, fps=1 / 0.5, pixel_pitch=(2.0, 4.0))
     inside = plain.valid
-    assert_allclose(scaled.u[inside], 2 * plain.u[inside], rtol=1e-9)
-    assert_allclose(scaled.v[inside], 4 * plain.v[inside], rtol=1e-9)
-    assert_allclose(scaled.u_y[inside], plain.u_y[inside] * 2 / 4, rtol=1e-9)
-    assert_allclose(scaled.v_x[inside], plain.v_x[inside] * 4 / 2, rtol=1e-9)
+    assert_allclose(scaled.u[inside], 2 * plain.u[inside] / 0.5, rtol=1e-9)
+    assert_allclose(scaled.v[inside], 4 * plain.v[inside] / 0.5, rtol=1e-9)
+    assert_allclose(scaled.u_y[inside], plain.u_y[inside] * 2 / 4 / 0.5, rtol=1e-9)
+    assert_allclose(scaled.v_x[inside], plain.v_x[inside] * 4 / 2 / 0.5, rtol=1e-9)
     assert_allclose(scaled.divergence[inside], plain.divergence[inside] / 0.5, rtol=1e-9)
     assert (scaled.frame_period, scaled.pixel_pitch) == (0.5, (2.0, 4.0))
 

@@ -1,7 +1,9 @@
 """A process that was forked, or begun in another way, computes as its parent does: nothing waits for threads or locks that stayed behind."""
 
+import concurrent.futures
 import hashlib
 import multiprocessing
+import multiprocessing.pool
 import os
 import select
 import signal
@@ -16,6 +18,7 @@ import jacoflow
 from benchmarks.scenes import motion3d as motion3d_scenes
 from benchmarks.scenes import stereo as stereo_scenes
 from conftest import METHODS
+import jacoflow.reference
 from jacoflow import motion3d, scenes, stereo, track
 
 PATIENCE = 100.0
@@ -195,6 +198,39 @@ def scene(carrier):
     return made.frame(1.0), made.truth(1.0).flow
 
 
+def dirichlet():
+    points = np.random.default_rng(1).normal(size=(20000, 3)) + np.arange(20000)[:, None] % 3 * 5
+    fitted = jacoflow.mixture.DirichletProcessGaussianMixture(4, max_iter=10, random_state=1).fit(points)
+    return fitted.means_, fitted.score_samples(points)
+
+
+def points_moved():
+    first, second, _ = sequence()
+    corners = jacoflow.corners(first)
+    return corners, *jacoflow.point_flow(first, second, corners)
+
+
+def particles():
+    made = jacoflow.filters.ParticleFilter(2, 50_000, batch=4, random_state=1)
+    made.predict(F=np.eye(2), Q=np.eye(2))
+    made.update(-0.5 * (made.x**2).sum(-1))
+    made.resample()
+    return (made.x,)
+
+
+def segmented():
+    return (jacoflow.segment.felzenszwalb(sequence()[0], 20.0),)
+
+
+def fused():
+    return field("windowed", temporal="recursive").flow, field("instantaneous", temporal="recursive").flow
+
+
+def filtered():
+    made = jacoflow.FlowFilter()
+    return [made.push(frame).flow for frame in sequence()]
+
+
 def observable():
     found = jacoflow.observability(sequence())
     return (found.condition, found.condition_number)
@@ -216,6 +252,13 @@ CALLS = {
     **{f"motion3d field {patches}": lambda patches=patches: moved_before_a_field(patches) for patches in (None, 24)},
     "motion3d bound": bound,
     "mixture": mixed,
+    "Dirichlet mixture": dirichlet,
+    "points": points_moved,
+    "particle filter": particles,
+    "segments": segmented,
+    "fusion": fused,
+    "flow filter": filtered,
+    "reference tracker": lambda: [jacoflow.reference.local_flow(*sequence(2)).flow],
 }
 """What computes, with so much to do that threads share it: none may use threads that a child cannot have anew."""
 
@@ -248,3 +291,27 @@ def test_processes_of_multiprocessing_compute_the_same(method, threads):
     finally:
         process.kill()
         process.join()
+
+
+@pytest.mark.parametrize("method", multiprocessing.get_all_start_methods())
+def test_executors_of_processes_compute_the_same(method):
+    before = [results(1), results(2)]
+    with concurrent.futures.ProcessPoolExecutor(2, multiprocessing.get_context(method)) as executor:
+        found = [quietly(lambda threads=threads: executor.submit(results, threads)) for threads in (1, 2)]
+        assert [each.result(PATIENCE) for each in found] == before
+
+
+def test_executors_of_threads_compute_the_same():
+    before = [results(1), results(2)] * 2
+    with concurrent.futures.ThreadPoolExecutor(3) as executor:
+        assert list(executor.map(results, [1, 2] * 2)) == before
+    with multiprocessing.pool.ThreadPool(3) as pool:
+        assert pool.map(results, [1, 2] * 2) == before
+
+
+def test_workers_of_joblib_compute_the_same():
+    joblib = pytest.importorskip("joblib")
+    before = [results(1), results(2)]
+    for backend in ("loky", "multiprocessing", "threading"):
+        work = (joblib.delayed(results)(threads) for threads in (1, 2))
+        assert quietly(lambda work=work, backend=backend: joblib.Parallel(2, backend=backend, timeout=PATIENCE)(work)) == before, backend

@@ -25,7 +25,7 @@ def textured_drive(height=96, width=128):
 
 def test_a_field_gives_the_motion_and_the_points():
     frames, camera = textured_drive()
-    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))
+    field = jacoflow.flow(*frames, method=jacoflow.Windowed(window_sigma=4.0))
     found, points = motion3d.estimate_field_motion(field, camera, robust=False)
     assert len(points) == len(found.inv_depth) >= 12
     assert np.diff(np.unique(points[:, 0])).min() >= max(8, 2 * field.correlation_length) - 1
@@ -46,7 +46,7 @@ def test_a_field_gives_the_motion_and_the_points():
 
 def test_a_field_has_a_map_of_times_to_contact():
     frames, camera = textured_drive()
-    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))
+    field = jacoflow.flow(*frames, method=jacoflow.Windowed(window_sigma=4.0))
     found, _ = motion3d.estimate_field_motion(field, camera, robust=False)
     contact, deviation, residual = motion3d.time_to_contact_map(field, found, camera)
     assert contact.shape == deviation.shape == residual.shape == field.shape
@@ -69,7 +69,7 @@ def test_a_field_has_a_map_of_times_to_contact():
 def test_a_map_has_the_errors_that_all_flow_has_in_common(common, form):
     # Patches that fit into the smaller picture leave the direction uncertain by more than 15 degrees.
     frames, camera = textured_drive(192, 256) if "patches" in form else textured_drive()
-    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))
+    field = jacoflow.flow(*frames, method=jacoflow.Windowed(window_sigma=4.0))
     found, points = motion3d.estimate_field_motion(field, camera, **form, **common)
     without, _ = motion3d.estimate_field_motion(field, camera, **form, **dict.fromkeys(common, 0.0))
     if "flow_scale_std" in common:
@@ -90,7 +90,7 @@ def test_a_map_has_the_errors_that_all_flow_has_in_common(common, form):
 
 def test_options_that_a_field_does_not_have_are_refused_by_name():
     frames, camera = textured_drive()
-    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))
+    field = jacoflow.flow(*frames, method=jacoflow.Windowed(window_sigma=4.0))
     whole, _ = motion3d.estimate_field_motion(field, camera, robust=False)
     box = (20, 10, 60, 50)
     for wrong, words in (
@@ -122,7 +122,7 @@ def test_options_that_a_field_does_not_have_are_refused_by_name():
 def test_the_rotation_of_a_scene_is_that_of_an_object_in_it():
     """As the prior that says the same by hand."""
     frames, camera = textured_drive()
-    field = jacoflow.estimate(frames, method=jacoflow.Windowed(window_sigma=4.0))
+    field = jacoflow.flow(*frames, method=jacoflow.Windowed(window_sigma=4.0))
     whole, _ = motion3d.estimate_field_motion(field, camera, robust=False)
     box = (20, 10, 60, 50)
     by_scene, _ = motion3d.estimate_field_motion(field, camera, region=box, scene=whole, object_rotation_std=0.002, robust=False)
@@ -162,7 +162,7 @@ def two_views(seed, noise):
 
 def test_two_patches_of_a_field_determine_a_motion():
     frames, u, _ = two_views(3, 1.0)
-    field = jacoflow.estimate(frames, method=jacoflow.CoarseToFine(preset="fast"))
+    field = jacoflow.flow(*frames, method=jacoflow.CoarseToFine(preset="fast"))
     found, middles = motion3d.estimate_field_motion(field, CAMERA, patches=150)
     assert len(middles) == 2 and found.status == "few_points" and found.inv_depth.shape == (2,)
     assert_array_equal(middles, [[84.5, 119.5], [234.5, 119.5]])

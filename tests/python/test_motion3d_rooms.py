@@ -107,7 +107,7 @@ def test_what_all_flow_has_in_common_is_in_a_rotation_alone_too():
     made = [rooms.room(seed, 1e-7, 0.004) for seed in range(900, 908)]
     held = 0
     for seed, room in enumerate(made):
-        turned, _ = motion3d.estimate_field_motion(jacoflow.estimate(rooms.frames(room, 3.0, seed)), rooms.K)
+        turned, _ = motion3d.estimate_field_motion(jacoflow.flow(*rooms.frames(room, 3.0, seed)), rooms.K)
         off = turned.rotation - room.w
         held += turned.status == "rotation_only" and off @ np.linalg.solve(turned.covariance[2:, 2:], off) < 7.81
     assert held >= 6, held
@@ -151,7 +151,7 @@ def test_noise_among_outliers_that_is_larger_than_given_widens_the_covariance():
 def test_the_truth_of_rooms_is_what_they_show():
     """Flow by displacement of what is seen agrees with that of the pictures."""
     made = rooms.room(3)
-    field = jacoflow.estimate(rooms.frames(made, 0.0, 3))
+    field = jacoflow.flow(*rooms.frames(made, 0.0, 3))
     points = np.argwhere(np.asarray(field.valid))[::97, ::-1]
     off = np.stack([field.u, field.v], axis=-1)[points[:, 1], points[:, 0]] - made.flow(points.astype(float))
     assert np.median(np.abs(off)) < 0.01

@@ -214,7 +214,7 @@ def test_damaged_pickles_are_refused(crossing):
         damaged = bytearray(state)
         damaged[at] ^= 1
         for broken in (bytes(damaged), state[:at]):
-            with pytest.raises(ValueError, match="^state: expected the bytes of a pickled particle tracker or step, got "):
+            with pytest.raises(ValueError, match="^state: expected the bytes of a pickled particle tracker, got "):
                 restore(broken, False)
             with pytest.raises(ValueError, match="^state: "):
                 _jacoflow._restore_particle_step(broken)

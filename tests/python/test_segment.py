@@ -172,9 +172,9 @@ def test_limits():
         ({"min_size": 1.5}, TypeError, "min_size: expected an integer, got 1.5"),
         ({"threads": 0}, ValueError, "threads: "),
         ({"image": np.zeros((0, 5), np.uint8)}, ValueError, "image: expected from 1 to 1073741824 pixels, got 0 x 5"),
-        ({"image": np.zeros((5, 5, 4), np.uint8)}, ValueError, r"image: expected shape \(H, W\) or \(H, W, 3\), got \[5, 5, 4\]"),
+        ({"image": np.zeros((5, 5, 4), np.uint8)}, ValueError, r"image: expected shape \(H, W\) or \(H, W, 3\), got \(5, 5, 4\)"),
         ({"image": np.zeros(5)}, ValueError, "image: "),
-        ({"image": np.zeros((5, 5), np.int64)}, TypeError, "image: .*int64"),
+        ({"image": np.zeros((5, 5), complex)}, TypeError, "image: .*complex128"),
         ({"image": np.ma.zeros((5, 5))}, TypeError, "image: .*masked"),
     ],
 )

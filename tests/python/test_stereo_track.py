@@ -515,11 +515,6 @@ def test_a_step_that_failed_changes_nothing():
     assert good.graph == other.graph
 
 
-def test_a_tracker_says_what_to_keep_of_it():
-    with pytest.raises(TypeError, match="StereoTracker: "):
-        pickle.dumps(StereoTracker())
-
-
 @pytest.mark.parametrize("text", [3, b"{}", None])
 def test_what_is_no_text_is_no_graph(text):
     with pytest.raises(TypeError, match="^json: expected a text"):

@@ -1,12 +1,14 @@
 """Compressed video: right frames, right brightness, files closed, clear refusals."""
 
+import pickle
 import sys
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import jacoflow
-from jacoflow import video
+from jacoflow import io, video
 
 av = pytest.importorskip("av")
 
@@ -97,3 +99,124 @@ def test_missing_pyav_says_how_to_get_it(clip, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(jacoflow.MissingDependencyError, match="PyAV"):
         video.frames(clip)
+
+
+def encode(path, codec, pix_fmt, images, layout, *, milliseconds=None, rotation=None):
+    """Writes `images`, arrays in `layout`, as a video; `milliseconds`: times of the frames."""
+    frames = [av.VideoFrame.from_ndarray(image, format=layout) for image in images]
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=RATE)
+        stream.width, stream.height, stream.pix_fmt = frames[0].width, frames[0].height, pix_fmt
+        if rotation is not None:
+            stream.set_display_rotation(rotation)
+        if milliseconds is not None:
+            stream.codec_context.time_base = Fraction(1, 1000)
+        for index, frame in enumerate(frames):
+            if milliseconds is not None:
+                frame.pts, frame.time_base = milliseconds[index], Fraction(1, 1000)
+            container.mux(stream.encode(frame))
+        container.mux(stream.encode())
+    return path
+
+
+PICTURES = [picture(index) for index in range(4)]
+# Luma of limited range.
+LIMITED = 16 + np.array(PICTURES, float) * 219 / 255
+
+
+@pytest.mark.parametrize(("pix_fmt", "shift"), [("gray12le", 4), ("gray16le", 0), ("yuv420p10le", 6)])
+def test_deep_video_keeps_its_depth(pix_fmt, shift, tmp_path):
+    deep = [(image.astype(np.uint16) << 8 | 0x35) >> shift for image in PICTURES]
+    if pix_fmt.startswith("yuv"):
+        middle = np.full((HEIGHT // 2, WIDTH), 512, np.uint16)
+        path = encode(tmp_path / "deep.mkv", "ffv1", pix_fmt, [np.concatenate([image, middle]) for image in deep], pix_fmt)
+    else:
+        path = encode(tmp_path / "deep.mkv", "ffv1", pix_fmt, deep, pix_fmt)
+    coded = list(io.frames(path))
+    assert all(frame.dtype == np.uint16 for frame in coded)
+    np.testing.assert_array_equal(coded, [image << shift for image in deep])
+    for grey in ("luma", "bt601"):
+        images = list(video.frames(path, grey=grey))
+        assert all(image.dtype == np.uint16 for image in images)
+        # Levels between those of 8 bit.
+        assert (np.array(images) % 257 != 0).any()
+        if pix_fmt.startswith("gray"):
+            assert np.abs(np.array(images, int) - np.array(coded, int)).max() <= 16
+    assert next(video.frames(path, grey=None)).dtype == np.uint16
+
+
+@pytest.mark.parametrize(("rotation", "turn"), [(90, 1), (-90, 3), (180, 2)])
+def test_rotated_video_is_turned_everywhere(rotation, turn, tmp_path):
+    path = encode(tmp_path / "phone.mkv", "ffv1", "gray", PICTURES, "gray", rotation=rotation)
+    want = [np.rot90(image, turn) for image in PICTURES]
+    np.testing.assert_array_equal(list(io.frames(path)), want)
+    shapes = {image.shape for image in video.frames(path)}
+    assert shapes == {want[0].shape}
+
+
+def test_times_of_a_variable_frame_rate(tmp_path):
+    path = encode(tmp_path / "vfr.mkv", "ffv1", "gray", PICTURES, "gray", milliseconds=[0, 40, 100, 300])
+    np.testing.assert_allclose([time for time, _ in io.frames(path).timed()], [0, 0.04, 0.1, 0.3])
+    reader = io.frames(path, start=1, step=2)
+    assert reader.time is None
+    next(reader)
+    assert reader.time == pytest.approx(0.04)
+
+
+def test_io_frames_opens_uncompressed_and_palette_video(tmp_path):
+    colour = [np.repeat(image[..., None], 3, axis=2) for image in PICTURES]
+    avi = encode(tmp_path / "raw.avi", "rawvideo", "bgr24", colour, "rgb24")
+    frames = list(io.frames(avi))
+    assert len(frames) == 4 and frames[0].shape == (HEIGHT, WIDTH)
+    assert np.abs(np.array(frames, float) - LIMITED).max() <= 1
+    assert np.abs(np.array(list(io.frames(avi, colour="rgb")), int) - np.array(colour)).max() <= 2
+    colour[1][:, :10, 0] = 255
+    red = encode(tmp_path / "red.avi", "rawvideo", "bgr24", colour, "rgb24")
+    with pytest.raises(jacoflow.FormatError, match="holds colour"):
+        list(io.frames(red))
+    assert len(list(io.frames(red, colour="luminance", start=1))) == 3
+    gif = tmp_path / "clip.gif"
+    imageio = pytest.importorskip("imageio.v3")
+    imageio.imwrite(gif, np.array(PICTURES), duration=40)
+    frames = list(io.frames(gif))
+    assert len(frames) == 4
+    assert np.abs(np.array(frames, float) - LIMITED).max() <= 2
+
+
+def test_readers_of_video_pickle_where_they_stand(clip):
+    reader = io.frames(clip, start=2, step=3)
+    first = next(reader)
+    assert reader.frame_rate == pytest.approx(RATE / 3)
+    rest = list(pickle.loads(pickle.dumps(reader)))
+    assert [int(image[0, 0]) for image in [first, *rest]] == [40, 70, 100, 130]
+
+
+def test_without_any_decoder_both_are_named(clip, monkeypatch, tmp_path):
+    monkeypatch.setitem(sys.modules, "av", None)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(jacoflow.MissingDependencyError, match=r"clip\.mkv: .*PyAV \(pip install .*\) or the program ffmpeg"):
+        io.frames(clip)
+
+
+def test_the_program_ffmpeg_gives_the_same_frames(clip, monkeypatch, tmp_path):
+    ffmpeg = pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "ffmpeg").symlink_to(ffmpeg)
+    colour = [np.repeat(image[..., None], 3, axis=2) for image in PICTURES]
+    files = [
+        clip,
+        encode(tmp_path / "raw.avi", "rawvideo", "bgr24", colour, "rgb24"),
+        encode(tmp_path / "deep.mkv", "ffv1", "gray12le", [image.astype(np.uint16) << 4 | 5 for image in PICTURES], "gray12le"),
+        encode(tmp_path / "vfr.mkv", "ffv1", "gray", PICTURES, "gray", milliseconds=[0, 40, 100, 300]),
+        encode(tmp_path / "phone.mkv", "ffv1", "gray", PICTURES, "gray", rotation=90),
+    ]
+    for path in files:
+        with_pyav = list(io.frames(path).timed())
+        with monkeypatch.context() as patch:
+            patch.setitem(sys.modules, "av", None)
+            patch.setenv("PATH", str(tmp_path / "bin"))
+            with_program = list(io.frames(path).timed())
+        assert len(with_pyav) == len(with_program)
+        for (time, frame), (other_time, other) in zip(with_pyav, with_program, strict=True):
+            assert time == pytest.approx(other_time, abs=1e-3), path
+            np.testing.assert_array_equal(frame, other, str(path))

@@ -7,7 +7,7 @@ use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
 use jacoflow::synth::{RotatingRamp, Scene};
 use jacoflow::temporal::{FilterForm, FlowFilter, FlowFilterOptions, Transition};
-use jacoflow::types::{Frame, Mask, Rect, SamplingGrid, Status};
+use jacoflow::types::{Frame, Mask, Rect, SamplingGrid, Status, Units};
 use std::f64::consts::PI;
 
 mod equivalence;

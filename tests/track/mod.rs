@@ -5,6 +5,7 @@ mod gauss_markov;
 mod grey_levels;
 mod particle_options;
 mod particle_persist;
+mod persist;
 #[cfg(feature = "reference")]
 mod reference;
 mod stereo_graph;

@@ -7,12 +7,13 @@ from typing import Literal
 
 from numpy.typing import ArrayLike
 
+from .._brief import Brief
 from .._jacoflow import _motion3d_bound
 from ._checks import Array, layout, switch
 
 
-@dataclass(frozen=True, eq=False)
-class MotionBound:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionBound(Brief):
     """What theory predicts for a layout of points: covariances of (psi, w), rad and rad/frame."""
 
     crlb: Array

@@ -64,7 +64,7 @@ def estimate_motion(
 
     Parameters
     ----------
-    points : array (N, 2), px with K, else (x, y) on the plane at distance 1; (N, 3), unit bearings, on the sphere
+    points : array (N, 2), px with K, else (x, y) on the plane at distance 1, within 10; (N, 3), unit bearings, on the sphere
         Where. Rows that are not finite are left out.
     flow : array (N, 2), px/frame with K, else per frame; (N, 3) on the sphere
         Displacement over one frame.

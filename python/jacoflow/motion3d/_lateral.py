@@ -8,14 +8,15 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._brief import Brief
 from .._jacoflow import _motion3d_lateral, _motion3d_lateral_bound
 from ._checks import number, word
 
 __all__ = ["LateralBound", "LateralEstimate", "estimate_lateral", "lateral_bound"]
 
 
-@dataclass(frozen=True, eq=False)
-class LateralEstimate:
+@dataclass(frozen=True, eq=False, repr=False)
+class LateralEstimate(Brief):
     """The direction of a translation along the image plane, an angle in rad, with its variance and the inverse depths (N,)."""
 
     angle: float
@@ -40,8 +41,8 @@ class LateralEstimate:
         return float(np.degrees(np.sqrt(self.variance)))
 
 
-@dataclass(frozen=True)
-class LateralBound:
+@dataclass(frozen=True, repr=False)
+class LateralBound(Brief):
     """Variances of the angle of a translation along the image plane, rad^2, for known depths."""
 
     crlb: float

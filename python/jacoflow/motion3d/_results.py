@@ -8,12 +8,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .._brief import Brief, Rows
 from .._jacoflow import _motion3d_focus
 from ._checks import Array, kind
 
 
-@dataclass(frozen=True, eq=False)
-class MotionSolution:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionSolution(Brief):
     """A motion by itself, rad/frame: the maximum-likelihood solution, or another motion that explains the flow about as well."""
 
     translation: Array
@@ -28,8 +29,8 @@ class MotionSolution:
     """Sum of the squared residuals across the epipolar lines, in units of noise; of alternatives: how much more than that of the first choice, with what the depths say."""
 
 
-@dataclass(frozen=True, eq=False)
-class CommonEffect:
+@dataclass(frozen=True, eq=False, repr=False)
+class CommonEffect(Brief):
     """What a factor and a displacement do to a motion that all flow has in common (`flow_scale_std`, `flow_bias_std` of `estimate_motion`): `motion.T @ motion` (5, 5) is in its covariance, rad and rad/frame."""
 
     scale: float
@@ -40,9 +41,11 @@ class CommonEffect:
     """What one standard deviation of the factor and each displacement do to (psi, w) (3, 5), rad and rad/frame."""
 
 
-@dataclass(frozen=True, eq=False)
-class MotionEstimate:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionEstimate(Rows):
     """A rigid motion, rad/frame, with its uncertainty and the inverse depths (N,) of its points."""
+
+    _ROWS = ("inv_depth", "inv_depth_std", "inv_depth_smooth", "surface_slopes", "time_to_contact", "time_to_contact_std", "inliers", "residuals")
 
     translation: Array
     """Unit direction `u` (3,) of the scene relative to the camera, no unit; NaN where there is none."""
@@ -56,7 +59,7 @@ class MotionEstimate:
     fell_back: bool
     """Whether smoothed weights were requested but had no solution, so that the result is that of maximum likelihood (no unit)."""
     covariance: Array
-    """Covariance (5, 5) of (psi, w): the direction is `u + psi @ tangent`, psi in rad, w in rad/frame. Where residuals are larger than the given noise, by more than chance, it is larger by as much."""
+    """Covariance (5, 5) of (psi, w): the direction is `u + psi @ tangent`, psi in rad, w in rad/frame. Where residuals are larger than the given noise, by more than chance, it is larger by as much. NaN where it is not known: also of 7 points and fewer without `noise_std` and `cov`, whose residuals do not say how large the noise is (Student's distribution with up to two degrees of freedom has no variance). Of "ill_conditioned" its directions reach as far as those that explain the flow as well."""
     tangent: Array
     """Axes (2, 3) of psi: unit vectors perpendicular to `u`, no unit."""
     common_errors: CommonEffect
@@ -64,7 +67,7 @@ class MotionEstimate:
     crlb: Array
     """The Cramer-Rao bound (5, 5) of (psi, w) (8), rad and rad/frame, with the information estimated; NaN where that is mostly noise."""
     direction_std: float
-    """Standard deviation of the direction, `sqrt(trace(covariance[:2, :2]))`, in units of degrees."""
+    """Standard deviation of the direction, `sqrt(trace(covariance[:2, :2]))`, in units of degrees; NaN where `covariance` is."""
     rotation_std: Array
     """Standard deviations (3,) of `rotation`, rad/frame."""
     inv_depth: Array

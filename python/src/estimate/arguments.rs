@@ -17,7 +17,7 @@ macro_rules! estimator_options {
             initial: Object as Object = None,
             temporal: Object as Object = None,
             covariance: Option<bool> as Option<bool> = None,
-            noise: Option<f64> as Option<f64> = None,
+            noise: Object as Object = None,
             diagnostics: bool as bool = false,
         }
     };
@@ -105,11 +105,11 @@ impl Arguments {
             sites: options::grid(py, &self.grid)?,
             mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
             initial: self.initial.as_ref().map(|flow| initial(flow.bind(py))).transpose()?,
-            units: options::units(py, &self.pixel_pitch, self.length_unit.as_deref(), self.fps)?,
+            units: options::units(py, &self.pixel_pitch, self.length_unit.as_deref(), &self.fps)?,
             covariance: self.covariance.unwrap_or(method.info().has_covariance),
             systematic,
             diagnostics: self.diagnostics,
-            noise: self.noise,
+            noise: options::real(py, "noise", &self.noise)?,
             threads: options::threads(self.threads)?,
             simd: options::simd(self.simd.as_deref())?,
         })

@@ -9,6 +9,7 @@ use super::keywords::with_common;
 use super::options::{Integer, Object};
 use super::progress::Reporter;
 use crate::errors::Outcome;
+use crate::interrupt::interruptible;
 use arguments::{Arguments, estimator_options};
 use jacoflow::error::Error;
 use jacoflow::temporal::AnyFlowStream;
@@ -107,9 +108,9 @@ fn run(
     let mut last = None;
     for index in 0..frames.count {
         let frame = frames.get(index)?;
-        let mut field = py.detach(|| stream.push_at(frame, None))?;
+        let mut field = interruptible(py, || stream.push_at(frame, None))?;
         if ends == Ends::Missing && index == 1 && field.is_none() {
-            field = py.detach(|| stream.first_step())?;
+            field = interruptible(py, || stream.first_step())?;
         }
         progress.step(index + 1, frames.count)?;
         let Some(field) = field else { continue };
@@ -132,13 +133,15 @@ macro_rules! define_estimate {
     ([] $($option:ident: $kept:ty as $taken:ty = $default:tt,)*) => {
         /// Flow, its Jacobian and their covariance at every frame of a sequence.
         ///
-        /// T frames give a FlowField of T fields, (T, H, W), whatever the container: field t belongs to frame
+        /// T frames give a FlowField of T fields, (T, H, W), in any container: field t belongs to frame
         /// t. Frames at the ends that lack a neighbour have NaN and the status MISSING_FRAME: with the
         /// default method, which gives the step to the next frame, the last; the first step is estimated
         /// from its two frames. Two frames are estimated as a pair (every method but "instantaneous").
         /// For one field from two or three frames see `flow`. Frames are uint8, uint16, float32 or float64 in
-        /// any grey scale: the intensity gain does not change the flow. float64 is computed in float64,
-        /// everything else in float32. Inputs are never modified.
+        /// any grey scale: the intensity gain does not change the flow. Other types are converted where that
+        /// is exact: bool to uint8, int8, int16 and float16 to float32, wider integers up to 2^53 to float64.
+        /// Pixels that a masked array hides are not used. float64 is computed in float64, everything else in
+        /// float32. Inputs are never modified.
         ///
         /// Parameters
         /// ----------
@@ -149,7 +152,7 @@ macro_rules! define_estimate {
         ///     "drop" leaves out the frames at the ends that lack a neighbour: two frames give one field,
         ///     three or more (T - 2, H, W), or (T - 1, H, W) with the time scheme "pair".
         /// pairs : bool
-        ///     Frames of double-frame recordings, 0 and 1, 2 and 3, ...: T / 2 fields, and none between pairs.
+        ///     Frames of double-frame recordings, 0 and 1, 2 and 3, ...: T / 2 fields, none between pairs.
         /// method : "coarse_to_fine", "windowed", "instantaneous", "lucas_kanade", "horn_schunck", or options
         ///     A name means the method with its defaults; `CoarseToFine` (default), `Windowed`,
         ///     `Instantaneous`, `LucasKanade` and `HornSchunck` hold its options and say what it is for.
@@ -189,7 +192,7 @@ macro_rules! define_estimate {
         ///     Default: environment variable JACOFLOW_SIMD, else the best of the processor.
         /// progress : None, True or function (done, total)
         ///     True draws a line on standard error; a function is called after each frame. Ctrl-C stops
-        ///     between frames.
+        ///     also amid a frame.
         ///
         /// Raises
         /// ------
@@ -289,7 +292,7 @@ fn estimate_one(frames: &Bound<'_, PyList>, arguments: Arguments) -> Outcome<Flo
     }
     for index in 0..frames.count {
         let frame = frames.get(index)?;
-        if let Some(field) = py.detach(|| stream.push_at(frame, None))? {
+        if let Some(field) = interruptible(py, || stream.push_at(frame, None))? {
             return Ok(FlowField::any(field));
         }
     }

@@ -3,6 +3,7 @@
 use super::{arguments::Arguments, arguments::estimator_options};
 use crate::arrays::{self, ColourRule};
 use crate::errors::Outcome;
+use crate::interrupt::{alone, interruptible};
 use crate::options::{self, Integer, Object};
 use crate::{field::FlowField, image::renamed, keywords::constructor, keywords::with_common};
 use jacoflow::error::Error;
@@ -47,21 +48,31 @@ impl FlowEstimator {
     /// come, before that None.
     ///
     /// `time`, s, is when the frame was taken, for every frame or none: fields are then per second, each by
-    /// the time between its own frames, whatever `fps` says. Where a frame is missing, "coarse_to_fine"
+    /// the time between its own frames, and not `fps`. Where a frame is missing, "coarse_to_fine"
     /// estimates the step to the next one from two frames. A frame that raises an error (ValueError for
-    /// another size or a time not after the last, TypeError for another dtype) is not kept.
+    /// another size or a time not after the last, TypeError for another dtype) is not kept. Ctrl-C stops the
+    /// work and forgets every frame.
     #[pyo3(signature = (frame, *, time=None))]
-    fn push(&mut self, frame: &Bound<'_, PyAny>, time: Option<f64>) -> Outcome<Option<FlowField>> {
-        let py = frame.py();
-        let frame = arrays::frame("frame", frame, self.colour)?;
-        let field =
-            py.detach(|| self.stream.push_at(frame, time)).map_err(|error| renamed(error, "frames", "frame"))?;
-        Ok(field.map(FlowField::any))
+    fn push(slf: &Bound<'_, Self>, frame: &Bound<'_, PyAny>, time: Option<f64>) -> Outcome<Option<FlowField>> {
+        let (py, mut this) = (slf.py(), alone(slf)?);
+        let frame = arrays::frame_with_gaps("frame", frame, this.colour)?;
+        let (stream, mut completed) = (&mut this.stream, false);
+        let field = interruptible(py, || {
+            let field = stream.push_at(frame, time).map_err(|error| renamed(error, "frames", "frame"));
+            completed = true;
+            field
+        });
+        if !completed {
+            // Stopped by Ctrl-C in the middle of a frame.
+            this.stream.reset();
+        }
+        Ok(field?.map(FlowField::any))
     }
 
     /// Forgets every frame (H, W); the next one begins a new sequence, frame index 0.
-    fn reset(&mut self) {
-        self.stream.reset();
+    fn reset(slf: &Bound<'_, Self>) -> Outcome<()> {
+        alone(slf)?.stream.reset();
+        Ok(())
     }
 
     /// Frames that must come before the first field (a count, no unit).

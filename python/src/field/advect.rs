@@ -3,7 +3,7 @@
 use super::{FlowField, Store, each};
 use crate::arrays;
 use crate::errors::Outcome;
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::flow::{PointCovariance, advect};
 use jacoflow::types::Status;
 use pyo3::prelude::*;
@@ -86,7 +86,7 @@ impl FlowField {
 fn positions(object: &Bound<'_, PyAny>) -> Outcome<Vec<[f64; 2]>> {
     let (shape, values) = arrays::doubles("points", object)?;
     if shape != [0] && !matches!(shape[..], [_, 2]) {
-        return Err(Error::argument("points", "shape (N, 2), columns x and y, px", format!("{shape:?}")).into());
+        return Err(Error::argument("points", "shape (N, 2), columns x and y, px", shape_text(&shape)).into());
     }
     Ok(values.as_chunks::<2>().0.to_vec())
 }
@@ -98,7 +98,14 @@ fn matrices(object: &Bound<'_, PyAny>, count: usize) -> Outcome<Vec<PointCovaria
     let all = match shape[..] {
         [2, 2] => vec![each[0]; count],
         [n, 2, 2] if n == count => each.to_vec(),
-        _ => return Err(Error::argument("covariance", MATRICES, format!("shape {shape:?} for {count} points")).into()),
+        _ => {
+            return Err(Error::argument(
+                "covariance",
+                MATRICES,
+                format!("shape {} for {count} points", shape_text(&shape)),
+            )
+            .into());
+        }
     };
     match all.iter().find(|matrix| !is_covariance(matrix)) {
         Some(odd) => Err(Error::argument("covariance", MATRICES, format!("{odd:?}")).into()),

@@ -45,9 +45,9 @@ impl Measurement {
         field: &FlowField<T>,
         measured: &Measured,
         region: Option<&Region>,
-        seed: Option<(f64, f64)>,
+        at: Option<(f64, f64)>,
     ) -> jacoflow::Result<()> {
-        let fit = fit_region(field, region, seed)?;
+        let fit = fit_region(field, region, at)?;
         let (value, std) = match measured {
             Measured::Parameter(place) => measure_parameter(*place, &fit),
             Measured::Derived(quantity) => measure(field, *quantity, &fit)?,
@@ -97,8 +97,7 @@ impl Measurement {
         self.numbers(py, |row| row.std)
     }
 
-    /// Share of the region's sites with an estimate that follow the motion, float or float64 array (T,), 0 to
-    /// 1; a site that the frames contradict (status INCONSISTENT) follows none.
+    /// Share of the region's valid sites that follow the motion, float or float64 array (T,), 0 to 1.
     #[getter]
     fn share<'py>(&self, py: Python<'py>) -> Outcome<Bound<'py, PyAny>> {
         self.numbers(py, |row| row.fit.share())
@@ -116,7 +115,7 @@ impl Measurement {
         self.counts(py, |row| row.fit.count)
     }
 
-    /// "ok", "no_dominant_motion" or "too_few_sites", str or list of T of them.
+    /// "ok", "no_dominant_motion" or "too_few_sites" (no unit), str or list (T,) of them.
     #[getter]
     fn status<'py>(&self, py: Python<'py>) -> Outcome<Bound<'py, PyAny>> {
         let names = self.rows.iter().map(|row| RegionStatus::name(row.fit.status));

@@ -8,32 +8,34 @@ use pyo3::prelude::*;
 
 getters! {
     FlowField;
-    /// Divergence u_x + v_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
+    /// Divergence L_xx + L_yy of the rate L of the step, float64 array (..., H, W), 1/frame, or 1/s with a
+    /// frame period.
     divergence(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "divergence");
-    /// Curl v_x - u_y, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns
+    /// Curl L_yx - L_xy, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns
     /// clockwise on the screen.
     curl(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "curl");
-    /// Shear sqrt((u_x - v_y)^2 + (u_y + v_x)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame
+    /// Shear sqrt((L_xx - L_yy)^2 + (L_xy + L_yx)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame
     /// period.
     shear_magnitude(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "shear_magnitude");
-    /// Direction of the greatest stretch, atan2(u_y + v_x, u_x - v_y) / 2, float64 array (..., H, W), rad in
-    /// (-pi/2, pi/2], from x towards y.
+    /// Direction of the greatest stretch, atan2(L_xy + L_yx, L_xx - L_yy) / 2, float64 array (..., H, W),
+    /// rad in (-pi/2, pi/2], from x towards y.
     shear_axis(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "shear_axis");
-    /// Stretch u_x along x, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
+    /// Stretch L_xx along x, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
     strain_xx(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "strain_xx");
-    /// Stretch v_y along y, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
+    /// Stretch L_yy along y, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
     strain_yy(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "strain_yy");
-    /// Shear strain (u_y + v_x) / 2, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
+    /// Shear strain (L_xy + L_yx) / 2, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
     strain_xy(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "strain_xy");
-    /// Angular velocity (v_x - u_y) / 2, float64 array (..., H, W), rad/frame, or rad/s with a frame period.
+    /// Angular velocity (L_yx - L_xy) / 2, float64 array (..., H, W), rad/frame, or rad/s with a frame
+    /// period.
     angular_velocity(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "angular_velocity");
     /// Angular velocity, float64 array (..., H, W), revolutions per minute; ValueError without fps or
     /// frame_period.
     rpm(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "rpm");
     /// Distance of the point that does not move, float64 array (..., H, W), px, or units of the pixel pitch.
     centre_distance(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "centre_distance");
-    /// Time 2 / (u_x + v_y) until contact with a surface parallel to the image, float64 array (..., H, W),
-    /// frames, or s with a frame period; negative while it recedes.
+    /// Time from the field's frame to contact with a surface parallel to the image, float64 array (..., H,
+    /// W), frames, or s with a frame period; negative while it recedes.
     time_to_contact(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "time_to_contact");
     /// Speed sqrt(u^2 + v^2), float64 array (..., H, W), px/frame, or px/s with a frame period.
     speed(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "speed");
@@ -85,8 +87,9 @@ impl FlowField {
     /// `name`, in its unit.
     ///
     /// `region` None for every site, a rectangle (x, y, width, height), a disc (x, y, radius), a polygon of
-    /// corners (N, 2), px, or a boolean mask (H, W); `aggregate` "inverse_variance" weighs by the covariance,
-    /// "median" does without. Derived quantities are those of the mean motion: ratios, lengths and angles are
+    /// corners (N, 2), px, or a boolean mask (H, W); `aggregate` "inverse_variance" (default) weighs by the
+    /// covariance, "median" does without. The mean motion stands at the
+    /// centre of the sites; derived quantities are its own: ratios, lengths and angles are
     /// formed after the mean is, and what noise adds to a length is taken off. The standard deviation allows
     /// for the correlation of neighbouring estimates, and for an error that they have in common: what they
     /// claim and do not scatter. A single field only; `measure` fits one motion instead, and takes stacks.
@@ -115,11 +118,12 @@ impl FlowField {
     /// The parameter or derived quantity `name` of the one affine motion that a region follows, as
     /// `Measurement`; for a stack at each time.
     ///
-    /// `region` as in `region_mean`. The motion is that of more than half of the sites, else the status
-    /// is "no_dominant_motion" and the value NaN; with `seed`, a pixel (x, y), that of the sites around it,
-    /// whatever their share. u and v are those at the region's centre. A site follows the motion where its
-    /// flow differs by no more than its standard deviation and .1 px/frame explain at 99 %. ValueError for
-    /// unknown names, a region or seed outside the frame, and for a field without covariance.
+    /// `region` as in `region_mean`. The motion is that of more than half of the valid sites, else the status
+    /// is "no_dominant_motion" and the value NaN; with `at`, a pixel (x, y), that of the sites around it,
+    /// however few they are. u and v are those at the region's centre. A site follows the motion where its
+    /// flow differs by no more than its standard deviation and .1 px/frame explain at 99 %: motions that
+    /// differ by less are not told apart, and `std` does not hold that. ValueError for
+    /// unknown names, a region or pixel outside the frame, and for a field without covariance.
     ///
     /// >>> import jacoflow
     /// >>> scene = jacoflow.scenes.Scene("affine", width=96, height=64, u_x=0.01, v_y=0.01)
@@ -127,13 +131,13 @@ impl FlowField {
     /// >>> found = field.measure("time_to_contact", region=(20, 16, 56, 32))
     /// >>> round(found.value), found.unit, found.status
     /// (100, 'frame', 'ok')
-    #[pyo3(signature = (name, region=None, *, seed=None))]
+    #[pyo3(signature = (name, region=None, *, at=None))]
     fn measure(
         &self,
         py: Python<'_>,
         name: &str,
         region: Option<&Bound<'_, PyAny>>,
-        seed: Option<(f64, f64)>,
+        at: Option<(f64, f64)>,
     ) -> Outcome<Measurement> {
         let (measured, unit) = (derived::measured(self.layout(), name)?, derived::unit(self.layout(), name)?);
         let region = region::parse(region)?;
@@ -141,15 +145,15 @@ impl FlowField {
         each!(self.store, packed => {
             for index in 0..self.count {
                 let field = self.core(packed, index);
-                py.detach(|| measurement.add(&field, &measured, region.as_ref(), seed))?;
+                py.detach(|| measurement.add(&field, &measured, region.as_ref(), at))?;
                 py.check_signals()?;
             }
         });
         Ok(measurement)
     }
 
-    /// Unit of the parameter or derived quantity `name`: lengths in px or `length_unit`, times in frames, or in
-    /// seconds with a frame period. ValueError for another name.
+    /// Unit of the parameter or derived quantity `name`: lengths in px or `length_unit`, times in frames, or
+    /// in seconds with a frame period. ValueError for another name.
     fn unit(&self, name: &str) -> Outcome<String> {
         Ok(derived::unit(self.layout(), name)?)
     }

@@ -78,8 +78,8 @@ getters! {
     pixel_pitch(this) -> (f64, f64) = this.layout().units.pixel_pitch;
     /// Name of the unit of lengths, "px" unless there is a pixel pitch.
     length_unit(this) -> String = this.layout().units.length.clone();
-    /// What the flow at frame t is: "forward", the step to frame t + 1; "central", the mean of the steps before
-    /// and after; "instant", the velocity at frame t (no unit).
+    /// What the flow at frame t is: "forward", the step to frame t + 1; "central", the mean of the steps
+    /// before and after; "instant", the velocity at frame t (no unit).
     interval(this) -> &'static str = this.layout().interval.name();
     /// How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0
     /// where they are independent or it is not known.

@@ -3,7 +3,7 @@
 use super::{FlowField, Packed, Store, Stored, each};
 use crate::arrays;
 use crate::errors::{Outcome, Raised};
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::types::{FieldLayout, Interval, Rect, SamplingGrid, Status, Units};
 use numpy::{PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
@@ -122,7 +122,7 @@ pub fn from_arrays(
 ) -> Outcome<FlowField> {
     let (shape, values) = arrays::doubles("flow", flow)?;
     let [height, width, 2] = shape[..] else {
-        return Err(Error::argument("flow", "shape (H, W, 2)", format!("shape {shape:?}")).into());
+        return Err(Error::argument("flow", "shape (H, W, 2)", format!("shape {}", shape_text(&shape))).into());
     };
     // Plane k holds every `tail`-th value of an array from its `at`-th on.
     let planes = |values: &[f64], tail: usize, places: &[usize]| -> Vec<f64> {
@@ -132,7 +132,7 @@ pub fn from_arrays(
         let (shape, values) = arrays::doubles(name, object)?;
         if shape != [height, width, side, side] {
             let expected = format!("shape ({height}, {width}, {side}, {side})");
-            return Err(Raised::from(Error::argument(name, expected, format!("shape {shape:?}"))));
+            return Err(Raised::from(Error::argument(name, expected, format!("shape {}", shape_text(&shape)))));
         }
         Ok(planes(&values, side * side, places))
     };

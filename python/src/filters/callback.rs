@@ -45,7 +45,7 @@ impl Callbacks {
     }
 
     /// The callback's exception, if one was raised, else the core's error.
-    pub fn finish(self, result: Result<()>) -> Outcome<()> {
+    pub fn finish<T>(self, result: Result<T>) -> Outcome<T> {
         match self.raised.into_inner().unwrap_or_else(PoisonError::into_inner) {
             Some(raised) => Err(raised),
             None => Ok(result?),

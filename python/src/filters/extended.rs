@@ -1,7 +1,10 @@
 //! `ExtendedKalmanFilter`.
 
-use super::{callback::Callbacks, callback::entry, callback::lead, callback::lock, gaussian::GaussianFilter};
+use super::callback::{Callbacks, entry, lead, lock};
+use super::gaussian::{GaussianFilter, sizes};
+use super::sequence::{Record, filtered, for_each_time, items, noises, smoothed};
 use crate::errors::Outcome;
+use crate::options::Integer;
 use jacoflow::filter::ExtendedFilter as Core;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -12,7 +15,8 @@ use std::sync::Mutex;
 /// `dim_x` = n and `dim_z` = m dimensions; `batch` = B runs B independent filters, every array then having a
 /// leading axis (B, ...). Functions are vectorised over leading axes: `fx` and `Hx` map (..., n) to (..., n)
 /// and (..., m); `FJacobian` and `HJacobian` map the means (n,) or (B, n) to (n, n) or (B, n, n) and (m, n)
-/// or (B, m, n). Without a Jacobian central differences are taken.
+/// or (B, m, n). Without a Jacobian central differences are taken. `residual_z` and `state_add` serve the
+/// update, `residual_x` and `residual_z` the central differences, `residual_x` the smoother.
 #[pyclass(module = "jacoflow.filters", extends = GaussianFilter, frozen)]
 pub struct ExtendedKalmanFilter {
     core: Mutex<Core>,
@@ -38,10 +42,22 @@ fn on_rows(
 #[pymethods]
 impl ExtendedKalmanFilter {
     #[new]
-    #[pyo3(signature = (dim_x, dim_z, *, batch=None))]
-    fn new(py: Python<'_>, dim_x: usize, dim_z: usize, batch: Option<usize>) -> Outcome<PyClassInitializer<Self>> {
+    #[pyo3(signature = (dim_x, dim_z, *, batch=None, residual_x=None, residual_z=None, state_add=None))]
+    fn new(
+        py: Python<'_>,
+        dim_x: Integer,
+        dim_z: Integer,
+        batch: Option<Integer>,
+        residual_x: Option<Py<PyAny>>,
+        residual_z: Option<Py<PyAny>>,
+        state_add: Option<Py<PyAny>>,
+    ) -> Outcome<PyClassInitializer<Self>> {
+        let (dim_x, dim_z, batch) = sizes(dim_x, dim_z, batch)?;
         let core = Core::new(batch.unwrap_or(1), dim_x, dim_z)?;
         let base = GaussianFilter::new(py, &core.state, batch)?;
+        for (index, function) in [residual_x, residual_z, state_add].into_iter().enumerate() {
+            base.set_function(py, index, function)?;
+        }
         Ok(PyClassInitializer::from(base).add_subclass(Self { core: Mutex::new(core) }))
     }
 
@@ -55,10 +71,11 @@ impl ExtendedKalmanFilter {
         let mut core = lock(&slf.get().core)?;
         base.give(py, &mut core.state, None, None)?;
         let (batch, n, callbacks, work) = (base.batch, base.dim_x, Callbacks::default(), &mut *core);
+        let mut manifold = base.manifold(py, &callbacks);
         let result = py.detach(|| {
             let step = |points: &[f64], out: &mut [f64]| on_rows(&callbacks, "fx", &fx, batch, (n, n), (points, out));
             match &FJacobian {
-                None => work.predict_by_differences(step),
+                None => work.predict_by_differences_on(&mut manifold, step),
                 Some(jacobian) => work.predict(step, |means, out| {
                     let (shape_in, shape_out) = (lead(batch, &[n]), lead(batch, &[n, n]));
                     callbacks.call("FJacobian", &[(&shape_in, means)], &shape_out, out, |py, inputs| {
@@ -67,12 +84,13 @@ impl ExtendedKalmanFilter {
                 }),
             }
         });
+        drop(manifold);
         callbacks.finish(result)?;
         base.take(py, &core.state)
     }
 
-    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units; None and NaN mean a missing
-    /// one.
+    /// Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are
+    /// neither NaN nor masked. None means that all are missing.
     ///
     /// `HJacobian` None takes central differences of `Hx`. `R` replaces the attribute for this step.
     /// Exceptions of the functions leave x and P as they were.
@@ -89,12 +107,13 @@ impl ExtendedKalmanFilter {
         let mut core = lock(&slf.get().core)?;
         base.give(py, &mut core.state, None, R)?;
         let (batch, n, m, callbacks, work) = (base.batch, base.dim_x, base.dim_z, Callbacks::default(), &mut *core);
+        let mut manifold = base.manifold(py, &callbacks);
         let result = py.detach(|| {
             let measure =
                 |points: &[f64], out: &mut [f64]| on_rows(&callbacks, "Hx", &Hx, batch, (n, m), (points, out));
             match &HJacobian {
-                None => work.update_by_differences(&z, measure),
-                Some(jacobian) => work.update(&z, measure, |means, out| {
+                None => work.update_by_differences_on(&mut manifold, &z, measure),
+                Some(jacobian) => work.update_on(&mut manifold, &z, measure, |means, out| {
                     let (shape_in, shape_out) = (lead(batch, &[n]), lead(batch, &[m, n]));
                     callbacks.call("HJacobian", &[(&shape_in, means)], &shape_out, out, |py, inputs| {
                         Ok(jacobian.bind(py).call1((&inputs[0],))?)
@@ -102,14 +121,81 @@ impl ExtendedKalmanFilter {
                 }),
             }
         });
+        drop(manifold);
         callbacks.finish(result)?;
         base.take(py, &core.state)
     }
 
+    /// Filters the measurements `zs` of T times, each as `update` takes it, from the present state on;
+    /// functions as in `predict` and `update`.
+    ///
+    /// Returns means (T, n) and covariances (T, n, n), in the state's units, with the batch's axis after T.
+    /// `Rs`, a sequence of T items, replaces R where an item is not None.
+    #[pyo3(signature = (zs, fx, HJacobian, Hx, FJacobian=None, *, Rs=None))]
+    fn batch_filter<'py>(
+        slf: &Bound<'py, Self>,
+        zs: &Bound<'py, PyAny>,
+        fx: Py<PyAny>,
+        HJacobian: Option<Py<PyAny>>,
+        Hx: Py<PyAny>,
+        FJacobian: Option<Py<PyAny>>,
+        Rs: Option<&Bound<'py, PyAny>>,
+    ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, base, zs) = (slf.py(), slf.as_super().get(), items("zs", zs)?);
+        let (Rs, mut record) = (for_each_time("Rs", Rs, zs.len())?, Record::default());
+        let copy = |function: &Option<Py<PyAny>>| function.as_ref().map(|function| function.clone_ref(py));
+        for (z, R) in zs.iter().zip(&Rs) {
+            py.check_signals()?;
+            Self::predict(slf, fx.clone_ref(py), copy(&FJacobian))?;
+            Self::update(slf, z, copy(&HJacobian), Hx.clone_ref(py), R.as_ref())?;
+            record.push(py, base)?;
+        }
+        let [x, P] = record.arrays(py, base)?;
+        Ok((x, P))
+    }
+
+    /// Smooths filtered means `Xs` (T, n) and covariances `Ps` (T, n, n) of T times, in the state's units,
+    /// with the batch's axis after T; functions as in `predict`.
+    ///
+    /// Returns smoothed means (T, n), covariances and gains (T, n, n); gain k is from time k + 1 to k.
+    /// `Qs`, a sequence of T items, are of the step to their time. NaN where a state cannot be smoothed.
+    #[pyo3(signature = (Xs, Ps, fx, FJacobian=None, *, Qs=None))]
+    fn rts_smoother<'py>(
+        slf: &Bound<'py, Self>,
+        Xs: &Bound<'py, PyAny>,
+        Ps: &Bound<'py, PyAny>,
+        fx: Py<PyAny>,
+        FJacobian: Option<Py<PyAny>>,
+        Qs: Option<&Bound<'py, PyAny>>,
+    ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let (py, base) = (slf.py(), slf.as_super().get());
+        let (times, Xs, Ps) = filtered(base, Xs, Ps)?;
+        let Qs = noises(base, Qs, times)?;
+        let mut core = lock(&slf.get().core)?;
+        base.give(py, &mut core.state, None, None)?;
+        let (batch, n, callbacks, work) = (base.batch, base.dim_x, Callbacks::default(), &*core);
+        let mut manifold = base.manifold(py, &callbacks);
+        let result = py.detach(|| {
+            let step = |_: usize, points: &[f64], out: &mut [f64]| {
+                on_rows(&callbacks, "fx", &fx, batch, (n, n), (points, out))
+            };
+            let jacobian = FJacobian.as_ref().map(|jacobian| {
+                |_: usize, means: &[f64], out: &mut [f64]| {
+                    let (shape_in, shape_out) = (lead(batch, &[n]), lead(batch, &[n, n]));
+                    callbacks.call("FJacobian", &[(&shape_in, means)], &shape_out, out, |py, inputs| {
+                        Ok(jacobian.bind(py).call1((&inputs[0],))?)
+                    })
+                }
+            });
+            work.rts_smoother(&mut manifold, (&Xs, &Ps), Qs.as_deref(), step, jacobian)
+        });
+        drop(manifold);
+        let [x, P, K, _] = smoothed(py, base, times, callbacks.finish(result)?)?;
+        Ok((x, P, K))
+    }
+
     fn __repr__(slf: &Bound<'_, Self>) -> String {
-        let base = slf.as_super().get();
-        let batch = base.batch.map_or("None".to_owned(), |b| b.to_string());
-        format!("ExtendedKalmanFilter(dim_x={}, dim_z={}, batch={batch})", base.dim_x, base.dim_z)
+        format!("ExtendedKalmanFilter({})", slf.as_super().get().describe())
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Outcome<(Bound<'py, PyAny>, (Bound<'py, PyDict>,))> {
@@ -124,7 +210,7 @@ impl ExtendedKalmanFilter {
 #[pyfunction(name = "_restore_extended")]
 pub fn restore_extended<'py>(py: Python<'py>, state: &Bound<'py, PyDict>) -> Outcome<Bound<'py, ExtendedKalmanFilter>> {
     let (dim_x, dim_z, batch) = entry(state, "arguments")?.extract()?;
-    let filter = Bound::new(py, ExtendedKalmanFilter::new(py, dim_x, dim_z, batch)?)?;
+    let filter = Bound::new(py, ExtendedKalmanFilter::new(py, dim_x, dim_z, batch, None, None, None)?)?;
     filter.as_super().get().restore(state)?;
     Ok(filter)
 }

@@ -1,11 +1,14 @@
 //! What the three filters share: the batch of Gaussians as numpy arrays that the user may change in place.
 
+use super::callback::{Callbacks, entry};
+use super::manifold::{FUNCTIONS, Functions, function_or_none};
 use crate::errors::{Outcome, Raised};
+use crate::options::{Integer, count};
 use crate::{arrays, keywords::getters};
 use jacoflow::error::Error;
 use jacoflow::filter::{GaussianState, check_covariances, check_mean};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyTuple};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Mean, covariance and noise of a batch of filters, as float64 arrays.
@@ -15,6 +18,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// changed in place; a number given for P, Q or R means that multiple of the identity. ValueError for an x
 /// that is not finite and for a P, Q or R that is not finite, symmetric and positive semi-definite, when it
 /// is set or, changed in place, at the next step. Units are the state's and the measurement's own.
+///
+/// A state that cannot make a step is left as it was and marked in `failed`; an error is raised only when all
+/// are. For angles and other quantities that are no vectors, `residual_x`, `residual_z` and `state_add`
+/// replace differences and sums; None means those of vectors. Like all functions they are vectorised.
 #[pyclass(module = "jacoflow.filters", subclass, frozen)]
 pub struct GaussianFilter {
     pub dim_x: usize,
@@ -27,16 +34,30 @@ pub struct GaussianFilter {
 struct Variables {
     /// In the order of [`NAMES`].
     arrays: [Py<PyAny>; NAMES.len()],
+    /// In the order of [`FUNCTIONS`]; None: those of vectors.
+    functions: [Py<PyAny>; FUNCTIONS.len()],
+    failed: Vec<bool>,
     repairs: u64,
 }
 
 /// Attributes that are arrays.
-const NAMES: [&str; 8] = ["x", "P", "Q", "R", "y", "S", "K", "log_likelihood"];
+const NAMES: [&str; 9] = ["x", "P", "Q", "R", "y", "S", "K", "log_likelihood", "mahalanobis"];
+
+/// The dimensions and the batch as numbers.
+pub fn sizes(dim_x: Integer, dim_z: Integer, batch: Option<Integer>) -> Outcome<(usize, usize, Option<usize>)> {
+    let batch = batch.map(|batch| count("batch", batch)).transpose()?;
+    Ok((count("dim_x", dim_x)?, count("dim_z", dim_z)?, batch))
+}
 
 impl GaussianFilter {
     /// The arrays of a new core state.
     pub fn new(py: Python<'_>, state: &GaussianState, batch: Option<usize>) -> Outcome<Self> {
-        let variables = Variables { arrays: std::array::from_fn(|_| py.None()), repairs: 0 };
+        let variables = Variables {
+            arrays: std::array::from_fn(|_| py.None()),
+            functions: std::array::from_fn(|_| py.None()),
+            failed: state.failed.clone(),
+            repairs: 0,
+        };
         let filter = Self { dim_x: state.dim_x, dim_z: state.dim_z, batch, variables: Mutex::new(variables) };
         filter.set(2, arrays::owned(py, &[state.dim_x; 2], state.Q.clone())?.unbind());
         filter.set(3, arrays::owned(py, &[state.dim_z; 2], state.R.clone())?.unbind());
@@ -70,8 +91,26 @@ impl GaussianFilter {
         }
     }
 
+    /// Replaces function `index`.
+    pub fn set_function(&self, py: Python<'_>, index: usize, function: Option<Py<PyAny>>) -> Outcome<()> {
+        let function = function_or_none(FUNCTIONS[index], function, py)?;
+        let old = std::mem::replace(&mut self.variables().functions[index], function);
+        drop(old);
+        Ok(())
+    }
+
+    pub fn function(&self, py: Python<'_>, index: usize) -> Py<PyAny> {
+        self.variables().functions[index].clone_ref(py)
+    }
+
+    /// The functions for one step.
+    pub fn manifold<'a>(&self, py: Python<'_>, callbacks: &'a Callbacks) -> Functions<'a> {
+        let callables = std::array::from_fn(|index| Some(self.function(py, index)).filter(|f| !f.is_none(py)));
+        Functions { callables, callbacks, batch: self.batch, dims: (self.dim_x, self.dim_z) }
+    }
+
     /// Full shape of array `index`.
-    fn shape(&self, index: usize) -> Vec<usize> {
+    pub fn shape(&self, index: usize) -> Vec<usize> {
         self.batch.into_iter().chain(self.tail(index)).collect()
     }
 
@@ -84,6 +123,7 @@ impl GaussianFilter {
         Q: Option<&Bound<'_, PyAny>>,
         R: Option<&Bound<'_, PyAny>>,
     ) -> Outcome<()> {
+        state.failed.clone_from(&self.variables().failed);
         state.x = self.read(py, 0)?;
         state.P = self.read(py, 1)?;
         for (index, noise, target) in [(2, Q, &mut state.Q), (3, R, &mut state.R)] {
@@ -97,16 +137,26 @@ impl GaussianFilter {
 
     /// New arrays with the core's results; arrays handed out before keep their values.
     pub fn take(&self, py: Python<'_>, state: &GaussianState) -> Outcome<()> {
-        let results =
-            [(0, &state.x), (1, &state.P), (4, &state.y), (5, &state.S), (6, &state.K), (7, &state.log_likelihood)];
+        let results = [
+            (0, &state.x),
+            (1, &state.P),
+            (4, &state.y),
+            (5, &state.S),
+            (6, &state.K),
+            (7, &state.log_likelihood),
+            (8, &state.mahalanobis),
+        ];
         for (index, values) in results {
             self.set(index, arrays::owned(py, &self.shape(index), values.clone())?.unbind());
         }
-        self.variables().repairs = state.repairs;
+        let mut variables = self.variables();
+        variables.repairs = state.repairs;
+        variables.failed.clone_from(&state.failed);
         Ok(())
     }
 
-    fn read(&self, py: Python<'_>, index: usize) -> Outcome<Vec<f64>> {
+    /// The values of array `index`.
+    pub fn read(&self, py: Python<'_>, index: usize) -> Outcome<Vec<f64>> {
         let (shape, values) = arrays::doubles(NAMES[index], self.get(py, index).bind(py))?;
         let shared = matches!(index, 2 | 3) && shape == self.tail(index);
         if !shared && shape != self.shape(index) {
@@ -146,13 +196,20 @@ impl GaussianFilter {
         Ok(arrays::owned(py, &shape, values)?.unbind())
     }
 
-    /// Measurements `(m,)` or `(B, m)`; `None` is a missing one, a number is taken for `m = 1`.
+    /// Measurements `(m,)` or `(B, m)`; `None` is a missing one, as are masked components; a number is taken
+    /// for `m = 1`.
     pub fn measurement(&self, z: &Bound<'_, PyAny>) -> Outcome<Vec<f64>> {
         let total = self.batch.unwrap_or(1) * self.dim_z;
         if z.is_none() {
             return Ok(vec![f64::NAN; total]);
         }
-        let (shape, values) = arrays::doubles("z", z)?;
+        let masked = z.hasattr("mask")?;
+        let (shape, mut values) = arrays::doubles("z", &if masked { z.getattr("data")? } else { z.clone() })?;
+        if masked {
+            let mask = z.py().import("numpy.ma")?.call_method1("getmaskarray", (z,))?;
+            let mask = arrays::elements::<bool>(&arrays::as_array("z", &mask)?).unwrap_or_default();
+            values.iter_mut().zip(mask).filter(|(_, is_missing)| *is_missing).for_each(|(z, _)| *z = f64::NAN);
+        }
         let scalar = shape.is_empty() && total == 1;
         if !scalar && shape != self.shape(4) {
             let got = format!("shape {shape:?}");
@@ -167,6 +224,8 @@ impl GaussianFilter {
         for (index, name) in NAMES.iter().enumerate() {
             state.set_item(name, self.get(py, index))?;
         }
+        state.set_item("functions", PyTuple::new(py, &self.variables().functions)?)?;
+        state.set_item("failed", self.variables().failed.clone())?;
         state.set_item("repairs", self.variables().repairs)?;
         Ok(state)
     }
@@ -174,13 +233,27 @@ impl GaussianFilter {
     /// The inverse of [`Self::save`].
     pub fn restore(&self, state: &Bound<'_, PyDict>) -> Outcome<()> {
         for (index, name) in NAMES.iter().enumerate() {
-            let value =
-                state.get_item(name)?.ok_or_else(|| Error::argument("state", format!("the entry {name:?}"), "none"))?;
-            self.set(index, self.covariance(index, &value)?);
+            self.set(index, self.covariance(index, &entry(state, name)?)?);
         }
-        let repairs = state.get_item("repairs")?.map_or(Ok(0), |value| value.extract())?;
-        self.variables().repairs = repairs;
+        let functions: [Option<Py<PyAny>>; FUNCTIONS.len()] = entry(state, "functions")?.extract()?;
+        for (index, function) in functions.into_iter().enumerate() {
+            self.set_function(state.py(), index, function)?;
+        }
+        let failed: Vec<bool> = entry(state, "failed")?.extract()?;
+        let repairs = entry(state, "repairs")?.extract()?;
+        let mut variables = self.variables();
+        if failed.len() != variables.failed.len() {
+            let expected = format!("{} values of failed", variables.failed.len());
+            return Err(Error::argument("state", expected, failed.len()).into());
+        }
+        (variables.failed, variables.repairs) = (failed, repairs);
         Ok(())
+    }
+
+    /// The arguments that all filters have, as in a call.
+    pub fn describe(&self) -> String {
+        let batch = self.batch.map_or("None".to_owned(), |b| b.to_string());
+        format!("dim_x={}, dim_z={}, batch={batch}", self.dim_x, self.dim_z)
     }
 }
 
@@ -194,15 +267,25 @@ getters! {
     Q(this, slf) -> Py<PyAny> = this.get(slf.py(), 2);
     /// Measurement noise covariance, array (m, m) or (B, m, m), in the measurement's units squared.
     R(this, slf) -> Py<PyAny> = this.get(slf.py(), 3);
-    /// Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where the
-    /// measurement was missing.
+    /// Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where a component
+    /// was missing, as in S and K.
     y(this, slf) -> Py<PyAny> = this.get(slf.py(), 4);
     /// Covariance of the residual, array (m, m) or (B, m, m), in the measurement's units squared.
     S(this, slf) -> Py<PyAny> = this.get(slf.py(), 5);
     /// Gain of the last update, array (n, m) or (B, n, m), state units per measurement unit.
     K(this, slf) -> Py<PyAny> = this.get(slf.py(), 6);
-    /// Logarithm of the last measurement's likelihood, array () or (B,), no unit.
+    /// Logarithm of the likelihood of the last measurement's components that were there, array () or (B,), no
+    /// unit; zero without any.
     log_likelihood(this, slf) -> Py<PyAny> = this.get(slf.py(), 7);
+    /// Mahalanobis distance sqrt(y^T S^-1 y) of the last measurement, array () or (B,), in standard
+    /// deviations; zero where it was missing.
+    mahalanobis(this, slf) -> Py<PyAny> = this.get(slf.py(), 8);
+    /// Whether a step could not be carried out for a state, since P was last assigned: bool array () or
+    /// (B,), no unit. The state was left as it was before that step.
+    failed(this, slf) -> Outcome<Bound<'py, PyAny>> = {
+        let failed = this.variables().failed.clone();
+        arrays::owned(slf.py(), &this.shape(7), failed)
+    };
     /// How often a covariance had lost its positive definiteness and was repaired (a count, no unit).
     repairs(this) -> u64 = this.variables().repairs;
     /// Dimensions n of the state (a count, no unit).
@@ -223,6 +306,7 @@ impl GaussianFilter {
     #[setter(P)]
     fn set_p(&self, value: &Bound<'_, PyAny>) -> Outcome<()> {
         self.set(1, self.covariance(1, value)?);
+        self.variables().failed.fill(false);
         Ok(())
     }
     #[setter(Q)]
@@ -234,5 +318,35 @@ impl GaussianFilter {
     fn set_r(&self, value: &Bound<'_, PyAny>) -> Outcome<()> {
         self.set(3, self.covariance(3, value)?);
         Ok(())
+    }
+    /// Difference `residual_x(a, b)` of states, arrays (..., n) of one shape -> (..., n), in the state's
+    /// units; None: a - b.
+    #[getter]
+    fn residual_x(&self, py: Python<'_>) -> Py<PyAny> {
+        self.function(py, 0)
+    }
+    #[setter]
+    fn set_residual_x(&self, py: Python<'_>, value: Option<Py<PyAny>>) -> Outcome<()> {
+        self.set_function(py, 0, value)
+    }
+    /// Difference `residual_z(a, b)` of measurements, arrays (..., m) of one shape -> (..., m), in the
+    /// measurement's units; None: a - b.
+    #[getter]
+    fn residual_z(&self, py: Python<'_>) -> Py<PyAny> {
+        self.function(py, 1)
+    }
+    #[setter]
+    fn set_residual_z(&self, py: Python<'_>, value: Option<Py<PyAny>>) -> Outcome<()> {
+        self.set_function(py, 1, value)
+    }
+    /// Sum `state_add(x, dx)` of a state and a difference, arrays (n,) or (B, n) -> the same shape, in the
+    /// state's units; None: x + dx.
+    #[getter]
+    fn state_add(&self, py: Python<'_>) -> Py<PyAny> {
+        self.function(py, 2)
+    }
+    #[setter]
+    fn set_state_add(&self, py: Python<'_>, value: Option<Py<PyAny>>) -> Outcome<()> {
+        self.set_function(py, 2, value)
     }
 }

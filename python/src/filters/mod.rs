@@ -4,7 +4,9 @@ mod callback;
 mod extended;
 mod gaussian;
 mod kalman;
+mod manifold;
 mod particle;
+mod sequence;
 mod sigma_points;
 mod unscented;
 

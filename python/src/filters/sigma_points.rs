@@ -1,6 +1,7 @@
 //! `MerweScaledSigmaPoints`.
 
 use crate::errors::Outcome;
+use crate::options::{Integer, count};
 use crate::{arrays, keywords::getters};
 use jacoflow::error::Error;
 use jacoflow::filter::{SigmaPoints, check_dimension};
@@ -37,7 +38,8 @@ getters! {
 impl MerweScaledSigmaPoints {
     #[new]
     #[pyo3(signature = (n, alpha=None, beta=None, kappa=None))]
-    fn new(n: usize, alpha: Option<f64>, beta: Option<f64>, kappa: Option<f64>) -> Outcome<Self> {
+    fn new(n: Integer, alpha: Option<f64>, beta: Option<f64>, kappa: Option<f64>) -> Outcome<Self> {
+        let n = count("n", n)?;
         let default = SigmaPoints::default();
         let (alpha, beta, kappa) =
             (alpha.unwrap_or(default.alpha), beta.unwrap_or(default.beta), kappa.unwrap_or(default.kappa));

@@ -3,7 +3,7 @@
 use crate::errors::Outcome;
 use crate::options::{self, Group, Integer, Object};
 use crate::{arrays, keywords::keep_options, keywords::with_common};
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::filter::SigmaPoints;
 use jacoflow::temporal::{FilterForm, FlowFilterOptions, SquareRoot, Transition};
 use pyo3::prelude::*;
@@ -26,9 +26,9 @@ filter_options!(keep_options[Arguments]);
 fn twelve(group: &Group<'_>, name: &'static str, default: [f64; 12]) -> Outcome<[f64; 12]> {
     let Some(value) = group.get::<Bound<'_, PyAny>>(name)? else { return Ok(default) };
     let (shape, values) = arrays::doubles(name, &value)?;
-    values
-        .try_into()
-        .map_err(|_| Error::argument(name, "twelve numbers, shape (12,)", format!("shape {shape:?}")).into())
+    values.try_into().map_err(|_| {
+        Error::argument(name, "twelve numbers, shape (12,)", format!("shape {}", shape_text(&shape))).into()
+    })
 }
 
 impl Arguments {
@@ -76,7 +76,7 @@ impl Arguments {
             sites: options::grid(py, &self.grid)?,
             mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
             covariance: self.covariance,
-            units: options::units(py, &self.pixel_pitch, self.length_unit.as_deref(), self.fps)?,
+            units: options::units(py, &self.pixel_pitch, self.length_unit.as_deref(), &self.fps)?,
             threads: options::threads(self.threads)?,
             simd: options::simd(self.simd.as_deref())?,
         })

@@ -6,6 +6,7 @@ use super::arrays::{self, ColourRule};
 use super::options::{self, Integer, Object, PreprocessOptions};
 use super::{field::FlowField, keywords::constructor, keywords::with_common};
 use crate::errors::Outcome;
+use crate::interrupt::alone;
 use arguments::{Arguments, filter_options};
 use jacoflow::error::Error;
 use jacoflow::temporal::AnyFlowFilter;
@@ -38,15 +39,17 @@ impl FlowFilter {
     /// NON_FINITE. Where the frame contradicts the prediction (black, flashed, dropped) the motion is that of
     /// the frames before, with status PREDICTED. ValueError for a frame of another size, TypeError for
     /// another dtype; the filter is then unchanged.
-    fn push(&mut self, frame: &Bound<'_, PyAny>) -> Outcome<FlowField> {
-        let py = frame.py();
-        let frame = arrays::frame("frame", frame, self.colour)?;
-        Ok(FlowField::any(py.detach(|| self.filter.push(&frame)).map_err(named)?))
+    fn push(slf: &Bound<'_, Self>, frame: &Bound<'_, PyAny>) -> Outcome<FlowField> {
+        let (py, mut this) = (slf.py(), alone(slf)?);
+        let frame = arrays::frame("frame", frame, this.colour)?;
+        let filter = &mut this.filter;
+        Ok(FlowField::any(py.detach(|| filter.push(&frame)).map_err(named)?))
     }
 
     /// Forgets every frame (H, W): the next one starts new filters.
-    fn reset(&mut self) {
-        self.filter.reset();
+    fn reset(slf: &Bound<'_, Self>) -> Outcome<()> {
+        alone(slf)?.filter.reset();
+        Ok(())
     }
 
     /// Means q of the filters, float64 array (H, W, 12) or (N, 12), in 8-bit grey levels, px and frames; NaN

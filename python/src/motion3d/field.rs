@@ -5,6 +5,7 @@ use super::given::{camera, fixed, triple, word};
 use super::options::{Options, PLACEMENTS};
 use super::results::{PyEstimate, matrix};
 use crate::errors::Outcome;
+use crate::interrupt::interruptible;
 use crate::options::{self, Integer, Region};
 use crate::{arrays, field::FlowField, field::Store, field::each};
 use jacoflow::error::Error;
@@ -30,7 +31,7 @@ pub fn motion3d_field_points<'py>(
     let chosen = FieldOptions { spacing, most, region: options::region(region)?, ..FieldOptions::default() };
     let found = each!(field.store(), packed => {
         let field = field.core(packed, 0);
-        py.detach(|| field_points(&field, &chosen))
+        interruptible(py, || field_points(&field, &chosen))
     })?;
     let n = found.points.len();
     Ok((
@@ -110,7 +111,7 @@ pub fn motion3d_estimate_field<'py>(
     options.rotation_prior = layout.rotation_prior(options.rotation_prior)?;
     let found = each!(field.store(), packed => {
         let field = field.core(packed, 0);
-        py.detach(|| estimate_field_motion(&field, &camera, &chosen, &options))
+        interruptible(py, || estimate_field_motion(&field, &camera, &chosen, &options))
     })?;
     Ok((PyEstimate::new(py, found.estimate)?, matrix(py, &found.points)?.into_any()))
 }
@@ -159,7 +160,7 @@ pub fn motion3d_contact_map<'py>(
     let placement = word("placement", placement, &PLACEMENTS)?;
     let found = each!(field.store(), packed => {
         let field = field.core(packed, 0);
-        py.detach(|| contact_map(&field, &camera, &known, placement))
+        interruptible(py, || contact_map(&field, &camera, &known, placement))
     })?;
     let shape = [found.height, found.width];
     Ok((

@@ -4,7 +4,7 @@ use super::given::{PROJECTIONS, camera, fixed, rows, triple, word};
 use super::results::matrix;
 use crate::arrays;
 use crate::errors::Outcome;
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::motion3d::{Motion, focus_of_expansion};
 use pyo3::prelude::*;
 
@@ -66,7 +66,12 @@ pub fn motion3d_predict<'py>(
     let (depth_shape, depths) = arrays::doubles("inv_depth", inverse_depth)?;
     let count = shape.first().copied().unwrap_or(0);
     if depth_shape != [count] {
-        return Err(Error::argument("inv_depth", format!("shape ({count},)"), format!("shape {depth_shape:?}")).into());
+        return Err(Error::argument(
+            "inv_depth",
+            format!("shape ({count},)"),
+            format!("shape {}", shape_text(&depth_shape)),
+        )
+        .into());
     }
     if spherical {
         let bearings: Vec<[f64; 3]> = rows("points", &shape, &values)?;

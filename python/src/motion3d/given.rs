@@ -2,7 +2,7 @@
 
 use crate::arrays;
 use crate::errors::Outcome;
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::motion3d::{AffinePatches, Flow, Intrinsics, Noise};
 use pyo3::prelude::*;
 
@@ -37,7 +37,7 @@ pub fn rows<const D: usize>(name: &'static str, shape: &[usize], values: &[f64])
     if shape.len() == 2 && shape[1] == D || shape == [0] {
         return Ok(values.as_chunks::<D>().0.to_vec());
     }
-    Err(Error::argument(name, format!("shape (N, {D})"), format!("shape {shape:?}")).into())
+    Err(Error::argument(name, format!("shape (N, {D})"), format!("shape {}", shape_text(shape))).into())
 }
 
 /// A vector of space.
@@ -45,7 +45,7 @@ pub fn triple(name: &'static str, given: &Any<'_>) -> Outcome<[f64; 3]> {
     let (shape, values) = arrays::doubles(name, given)?;
     match values[..] {
         [x, y, z] if shape == [3] => Ok([x, y, z]),
-        _ => Err(Error::argument(name, "shape (3,)", format!("shape {shape:?}")).into()),
+        _ => Err(Error::argument(name, "shape (3,)", format!("shape {}", shape_text(&shape))).into()),
     }
 }
 
@@ -53,7 +53,7 @@ pub fn triple(name: &'static str, given: &Any<'_>) -> Outcome<[f64; 3]> {
 pub fn fixed<const D: usize, const N: usize>(name: &'static str, given: &Any<'_>) -> Outcome<[[f64; D]; N]> {
     let (shape, values) = arrays::doubles(name, given)?;
     let matrix = <[[f64; D]; N]>::try_from(values.as_chunks().0).ok().filter(|_| shape == [N, D]);
-    let wrong = || Error::argument(name, format!("shape ({N}, {D})"), format!("shape {shape:?}")).into();
+    let wrong = || Error::argument(name, format!("shape ({N}, {D})"), format!("shape {}", shape_text(&shape))).into();
     matrix.ok_or_else(wrong)
 }
 
@@ -61,7 +61,7 @@ pub fn fixed<const D: usize, const N: usize>(name: &'static str, given: &Any<'_>
 pub fn square(name: &'static str, of: &str, given: &Any<'_>) -> Outcome<[[f64; 3]; 3]> {
     let (shape, values) = arrays::doubles(name, given)?;
     if shape != [3, 3] {
-        return Err(Error::argument(name, format!("{of}shape (3, 3)"), format!("shape {shape:?}")).into());
+        return Err(Error::argument(name, format!("{of}shape (3, 3)"), format!("shape {}", shape_text(&shape))).into());
     }
     Ok(std::array::from_fn(|i| std::array::from_fn(|j| values[3 * i + j])))
 }
@@ -139,7 +139,7 @@ fn covariances(layout: &Layout<'_>, count: usize, size: usize) -> Outcome<Option
     let (shape, values) = arrays::doubles("cov", given)?;
     if shape != [count, size, size] {
         let expected = format!("shape ({count}, {size}, {size})");
-        return Err(Error::argument("cov", expected, format!("shape {shape:?}")).into());
+        return Err(Error::argument("cov", expected, format!("shape {}", shape_text(&shape))).into());
     }
     Ok(Some(values))
 }
@@ -151,7 +151,7 @@ fn six_numbers(flow: &Any<'_>, slopes: &Any<'_>) -> Outcome<Vec<[f64; 6]>> {
     let (shape, slopes) = arrays::doubles("jacobian", slopes)?;
     if shape != [flow.len(), 2, 2] {
         let expected = format!("shape ({}, 2, 2)", flow.len());
-        return Err(Error::argument("jacobian", expected, format!("shape {shape:?}")).into());
+        return Err(Error::argument("jacobian", expected, format!("shape {}", shape_text(&shape))).into());
     }
     let one = |(f, j): (&[f64; 2], &[f64; 4])| [f[0], f[1], j[0], j[2], j[1], j[3]];
     Ok(flow.iter().zip(slopes.as_chunks::<4>().0).map(one).collect())
@@ -188,8 +188,9 @@ impl GivenPatches {
                 Ok(Self { points, motion, covariances, camera: camera(layout.camera.as_ref())? })
             }
             other => {
-                let got = other.map_or_else(|| "none".into(), |(shape, _)| format!("shape {shape:?}"));
-                Err(Error::argument("cov", format!("shape {wanted:?}, for six numbers a patch"), got).into())
+                let got = other.map_or_else(|| "none".into(), |(shape, _)| format!("shape {}", shape_text(&shape)));
+                Err(Error::argument("cov", format!("shape {}, for six numbers a patch", shape_text(&wanted)), got)
+                    .into())
             }
         }
     }

@@ -3,7 +3,7 @@
 use super::{given::rows, given::word};
 use crate::arrays;
 use crate::errors::Outcome;
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::motion3d::{LateralBound, LateralEstimate, LateralWeights, estimate_lateral, lateral_bound};
 use pyo3::prelude::*;
 
@@ -57,7 +57,7 @@ pub fn motion3d_lateral_bound(
 ) -> Outcome<PyLateralBound> {
     let (shape, depths) = arrays::doubles("inv_depth", inverse_depth)?;
     if shape.len() != 1 {
-        return Err(Error::argument("inv_depth", "shape (N,)", format!("shape {shape:?}")).into());
+        return Err(Error::argument("inv_depth", "shape (N,)", format!("shape {}", shape_text(&shape))).into());
     }
     let LateralBound { bound, likelihood, ones, shrunk, crossover } =
         py.detach(|| lateral_bound(&depths, noise_std))?;

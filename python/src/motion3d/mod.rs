@@ -12,6 +12,7 @@ pub use flow::{motion3d_essential, motion3d_focus, motion3d_predict};
 pub use lateral::{motion3d_lateral, motion3d_lateral_bound};
 
 use crate::errors::Outcome;
+use crate::interrupt::interruptible;
 use given::{Given, GivenPatches, Layout, rows, triple};
 use jacoflow::motion3d::{
     Motion, check_motion, estimate_motion, estimate_patch_motion, motion_bound, patch_motion_bound,
@@ -33,11 +34,11 @@ pub fn motion3d_estimate<'py>(
     let options = options.core()?;
     if let Some(jacobian) = jacobian {
         let given = GivenPatches::new(points, Some((flow, jacobian)), &layout)?;
-        let found = py.detach(|| estimate_patch_motion(&given.patches(), &options))?;
+        let found = interruptible(py, || estimate_patch_motion(&given.patches(), &options))?;
         return PyEstimate::new(py, found);
     }
     let given = Given::new(points, Some(flow), &layout)?;
-    let found = py.detach(|| estimate_motion(&given.flow(), &given.noise(), &options))?;
+    let found = interruptible(py, || estimate_motion(&given.flow(), &given.noise(), &options))?;
     PyEstimate::new(py, found)
 }
 
@@ -59,10 +60,10 @@ pub fn motion3d_bound<'py>(
     if jacobian {
         let given = GivenPatches::new(points, None, &layout)?;
         let surfaces: Vec<[f64; 3]> = rows("inv_depth", &shape, &depths)?;
-        let bound = py.detach(|| patch_motion_bound(&given.patches(), &motion, &surfaces))?;
+        let bound = interruptible(py, || patch_motion_bound(&given.patches(), &motion, &surfaces))?;
         return PyBound::new(py, &bound);
     }
     let given = Given::new(points, None, &layout)?;
-    let bound = py.detach(|| motion_bound(&given.flow(), &given.noise(), &motion, &depths))?;
+    let bound = interruptible(py, || motion_bound(&given.flow(), &given.noise(), &motion, &depths))?;
     PyBound::new(py, &bound)
 }

@@ -1,7 +1,7 @@
 //! Options of the particle tracker as Python gives them.
 
 use crate::errors::Outcome;
-use crate::options::{self, Integer};
+use crate::options::{self, Integer, named};
 use crate::track::word;
 use jacoflow::error::Error;
 use jacoflow::filter::particle::Resampling;
@@ -14,7 +14,9 @@ use pyo3::prelude::*;
 #[pyo3(from_item_all)]
 pub(super) struct Given {
     mode: String,
+    #[pyo3(from_py_with = named::n_particles)]
     n_particles: usize,
+    #[pyo3(from_py_with = named::n_near)]
     n_near: usize,
     scale: Option<f64>,
     likelihoods: Option<Vec<String>>,
@@ -24,6 +26,7 @@ pub(super) struct Given {
     /// Scale, sigma and smallest region.
     segmentation: (f64, f64, Option<usize>),
     grey: String,
+    #[pyo3(from_py_with = named::random_state)]
     random_state: u64,
     threads: Option<Integer>,
 }

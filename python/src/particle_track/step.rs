@@ -95,7 +95,7 @@ fn step_dict<'py>(py: Python<'py>, step: &ParticleStep) -> Outcome<Bound<'py, Py
     out.set_item("degenerate", arrays::owned::<bool>(py, &[count], degenerate)?)?;
     out.set_item("near", arrays::owned::<bool>(py, &[count, count], step.near.clone())?)?;
     out.set_item("status", PyTuple::new(py, targets.iter().map(|target| target.state.status.name()))?)?;
-    out.set_item("reason", PyTuple::new(py, targets.iter().map(|target| target.state.reason))?)?;
+    out.set_item("reason", PyTuple::new(py, targets.iter().map(|target| &*target.state.reason))?)?;
     out.set_item("camera", arrays::owned::<f64>(py, &[2, 3], step.camera.as_flattened().to_vec())?)?;
     out.set_item("tracks", tracks(py, step)?)?;
     Ok(out)

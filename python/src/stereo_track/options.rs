@@ -1,7 +1,7 @@
 //! Options of the stereo tracker as Python gives them.
 
 use crate::errors::Outcome;
-use crate::options::{self, Integer};
+use crate::options::{self, Integer, named};
 use jacoflow::track::stereo::{StereoCamera, StereoMode, StereoTrackerOptions};
 use pyo3::prelude::*;
 
@@ -10,15 +10,18 @@ use pyo3::prelude::*;
 #[pyo3(from_item_all)]
 pub(super) struct Given {
     mode: String,
+    #[pyo3(from_py_with = named::n_components)]
     n_components: Option<usize>,
     disparity_range: [i32; 2],
     row_range: [i32; 2],
     row_offset: Option<f64>,
     grid: (usize, usize, Option<usize>),
+    #[pyo3(from_py_with = named::search)]
     search: usize,
     /// Focal length, baseline and disparity at infinity.
     camera: Option<(f64, f64, f64)>,
     step_time: f64,
+    #[pyo3(from_py_with = named::random_state)]
     random_state: u64,
     threads: Option<Integer>,
 }

@@ -2,9 +2,35 @@
 
 use super::{parse_not_negative, parse_positive, parse_rate};
 use crate::error::{Error, Result};
-use crate::io::{Colour, OpenOptions};
+use crate::io::{Colour, OpenOptions, PlaneSelection, Slices};
 use crate::pipeline::Numbering;
 use clap::Args;
+
+/// Which planes of TIFF files with several axes are frames.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct PlaneArguments {
+    /// Channel of TIFF files that hold several (ImageJ, OME-TIFF), from 0
+    #[arg(long, value_name = "N")]
+    pub channel: Option<usize>,
+    /// Slice (axis Z) of TIFF files that hold several, from 0; time: the slices are frames
+    #[arg(long, value_name = "N", value_parser = parse_slices)]
+    pub z: Option<Slices>,
+}
+
+impl PlaneArguments {
+    /// The selection of planes.
+    pub fn selection(self) -> PlaneSelection {
+        PlaneSelection { channel: self.channel, z: self.z }
+    }
+}
+
+fn parse_slices(text: &str) -> std::result::Result<Slices, String> {
+    match text.parse() {
+        Ok(index) => Ok(Slices::Index(index)),
+        Err(_) if text == "time" => Ok(Slices::AsTime),
+        Err(_) => Err("expected an index from 0, or time".into()),
+    }
+}
 
 /// Which frames of the input are used, and colour.
 #[derive(Debug, Clone, Args)]
@@ -12,6 +38,8 @@ pub struct SelectionArguments {
     /// Convert colour to luminance (0.299 R + 0.587 G + 0.114 B); without it colour is refused
     #[arg(long)]
     pub luminance: bool,
+    #[command(flatten)]
+    pub planes: PlaneArguments,
     /// Index of the first frame to use
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub start: usize,
@@ -28,6 +56,7 @@ impl SelectionArguments {
     pub fn options(&self) -> OpenOptions {
         OpenOptions {
             colour: if self.luminance { Colour::Luminance } else { Colour::Error },
+            planes: self.planes.selection(),
             start: self.start,
             stop: self.stop,
             step: self.step,
@@ -46,7 +75,7 @@ impl SelectionArguments {
     /// Which frames of the input these are; `given` or else `delivered` by the source: frames per second.
     pub fn numbering(&self, given: Option<f64>, delivered: Option<f64>) -> Numbering {
         let rate = given.or_else(|| delivered.map(|rate| rate * self.step as f64));
-        Numbering { start: self.start, step: self.step, rate }
+        Numbering { start: self.start, step: self.step, rate, has_own_times: given.is_none() }
     }
 }
 
@@ -60,7 +89,7 @@ pub struct InputArguments {
     pub input: Vec<String>,
     #[command(flatten)]
     pub selection: SelectionArguments,
-    /// Frames per second of the input (a number or a fraction); replaces what the file says
+    /// Frames per second of the input (a number or a fraction) [default: what the file says]
     #[arg(long, value_name = "RATE", value_parser = parse_rate)]
     pub fps: Option<f64>,
     /// Round samples down to multiples of STEP before anything else

@@ -66,6 +66,10 @@ pub struct MethodArguments {
     /// memory is 1/(1 - F) frames [default: 0.95]
     #[arg(long, value_name = "F")]
     pub forgetting: Option<f64>,
+    /// The frames are pairs of a double-frame recording, 1 and 2, 3 and 4, ...: a field for each pair and
+    /// none between them
+    #[arg(long)]
+    pub pairs: bool,
     /// Leave the covariance out: faster, smaller files
     #[arg(long)]
     pub no_covariance: bool,
@@ -91,7 +95,7 @@ impl MethodArguments {
     /// `smooth` px.
     pub fn method(&self, frames: Option<usize>, smooth: Option<f64>) -> Result<Method> {
         let method = word(&self.method);
-        let is_pair = frames == Some(2) && MethodInfo::named(&method)?.takes_pairs();
+        let is_pair = (self.pairs || frames == Some(2)) && MethodInfo::named(&method)?.takes_pairs();
         let settings = MethodSettings {
             method,
             preset: self.preset.clone(),

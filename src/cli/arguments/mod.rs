@@ -15,7 +15,7 @@ mod views;
 pub use compute::{ComputeArguments, MessageArguments, ThreadArguments};
 pub use filter::{FilterArguments, describe_filter};
 pub use grid::GridArguments;
-pub use input::{InputArguments, SelectionArguments};
+pub use input::{InputArguments, PlaneArguments, SelectionArguments};
 pub use method::MethodArguments;
 pub use output::OutputArguments;
 pub use particle_track::ParticleTrackerArguments;

@@ -1,9 +1,11 @@
 //! Where results go.
 
 use super::parse_positive;
+use crate::cli::open::refuse_inputs;
+use crate::error::Result;
 use crate::pipeline::PictureRanges;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Output, formats and pictures.
 #[derive(Debug, Clone, Args)]
@@ -35,6 +37,11 @@ pub struct OutputArguments {
 }
 
 impl OutputArguments {
+    /// Refuses to replace what is read.
+    pub fn refuse_inputs(&self, inputs: &[String]) -> Result<()> {
+        refuse_inputs(inputs.iter().map(Path::new), &[("output", self.output.as_deref())], self.force)
+    }
+
     /// Ranges of the pictures.
     pub fn ranges(&self) -> PictureRanges {
         PictureRanges { speed: self.max_speed, rate: self.max_rate }

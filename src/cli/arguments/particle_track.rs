@@ -130,10 +130,10 @@ mod tests {
         let all = Numbering::default();
         // Pixel 1 of the file is pixel 0 here and reaches from -1/2.
         assert_eq!(starts(all, None).unwrap(), [(4, 5, 7.5), (7, 1, 1.0), (9, 0, 6.5)]);
-        let every_second = Numbering { start: 0, step: 2, rate: None };
+        let every_second = Numbering { step: 2, ..Numbering::default() };
         assert_eq!(starts(every_second, None).unwrap(), [(7, 2, -0.5), (9, 0, 6.5)]);
         assert_eq!(starts(all, Some(1)).unwrap(), [(9, 0, 6.5)]);
-        let late = starts(Numbering { start: 6, step: 1, rate: None }, None).unwrap_err().to_string();
+        let late = starts(Numbering { start: 6, ..Numbering::default() }, None).unwrap_err().to_string();
         assert!(late.starts_with("boxes: expected"), "{late}");
         std::fs::write(&path, "1,-1,1,1,5,6,1\n").unwrap();
         assert!(starts(all, None).unwrap_err().to_string().contains("number of at least 0"));

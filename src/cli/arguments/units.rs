@@ -7,7 +7,8 @@ use clap::Args;
 /// Physical size of a pixel. The unit of time follows from the frame rate of the input.
 #[derive(Debug, Clone, Args)]
 pub struct UnitArguments {
-    /// Physical size of a pixel; lengths then come in that unit
+    /// Physical size of a pixel; lengths then come in that unit [default: what a TIFF file of ImageJ or OME
+    /// says, else px]
     #[arg(long, value_name = "DX[,DY]", value_parser = parse_pair)]
     pub pixel_pitch: Option<(f64, f64)>,
     /// Name of that unit, such as mm

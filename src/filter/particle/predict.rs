@@ -2,7 +2,7 @@
 
 use super::{noise::roots, state::ParticleFilter, state::Purpose};
 use crate::error::{Error, Result};
-use crate::filter::state::{check_covariances, check_matrix, expect, finite, shared};
+use crate::filter::checks::{check_covariances, check_finite, expect, finite, shared};
 use crate::math::dense::multiply_transposed;
 
 impl ParticleFilter {
@@ -42,7 +42,7 @@ impl ParticleFilter {
         self.check()?;
         let n = self.dim_x;
         expect("F", f, &[n * n, self.batch * n * n])?;
-        check_matrix("F", f)?;
+        check_finite("F", f)?;
         let roots = self.noise_roots(q)?;
         let mut next = vec![0.0; self.x.len()];
         let x = &self.x;

@@ -2,7 +2,7 @@
 
 use super::{noise::roots, weights::normalise_log_weights};
 use crate::error::{Error, Result};
-use crate::filter::state::{check_covariances, check_dimension, check_mean, expect, shared};
+use crate::filter::checks::{check_covariances, check_dimension, check_mean, expect, shared};
 use crate::math::{dense::multiply_transposed, random::CounterRng};
 use crate::parallel::{Threads, for_each_band_of};
 use std::ops::Range;

@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{MaskCounts, bands};
 use crate::jet::Reach;
+use crate::parallel::checkpoint;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, Status};
 use rayon::prelude::*;
@@ -260,6 +261,7 @@ impl System<'_> {
         let mut rz = dot(&r, &z);
         let target = tolerance * tolerance * rz;
         for _ in 0..iterations {
+            checkpoint();
             if rz <= target {
                 return Ok(f);
             }

@@ -1,8 +1,7 @@
 //! The affine motion that most of a region follows.
 
-use super::region_motion::Site;
 use crate::math::{MAD_TO_STD, central_median, random::CounterRng};
-use nalgebra::{SMatrix, SVector, Vector2};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
 
 /// Maximum number of sites that candidates are compared on.
 const COMPARED_SITES: usize = 2000;
@@ -11,8 +10,8 @@ const COMPARED_SITES: usize = 2000;
 const CANDIDATES: u64 = 256;
 /// Chi-square with two degrees of freedom that 99 % of the sites of a motion stay below.
 const CHI2_LIMIT: f64 = 9.21;
-/// Maximum standard deviation, px/frame, of what sites of one motion may differ by beyond their covariance: the
-/// field is smooth where the objects are not.
+/// Maximum standard deviation, px/frame, of what sites of one motion may differ by beyond their covariance:
+/// the field is smooth where the objects are not.
 const MAX_DEVIATION: f64 = 0.1;
 /// Refits to the sites that follow.
 const REFITS: usize = 5;
@@ -20,6 +19,23 @@ const REFITS: usize = 5;
 const NEAR_SHARE: f64 = 0.1;
 /// Minimum number of them.
 const MIN_NEAR: usize = 30;
+
+/// The flow of a site in px/frame, at its place from the centre in px.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Site {
+    /// Its index in the field.
+    pub(super) index: usize,
+    pub(super) x: f64,
+    pub(super) y: f64,
+    pub(super) flow: Vector2<f64>,
+    pub(super) covariance: Matrix2<f64>,
+}
+
+impl Site {
+    fn place(&self) -> Vector3<f64> {
+        Vector3::new(1.0, self.x, self.y)
+    }
+}
 
 /// Affine flow `f(p) = A (1, x, y)^T` about the region's centre, with the deviation of its sites.
 #[derive(Debug, Clone, Copy)]
@@ -47,21 +63,21 @@ impl AffineMotion {
     }
 }
 
-/// The motion that the largest number of `sites` follow, or with `seed` the site (by its place in the list)
-/// whose motion is asked for: of candidates through three sites each the one with the least truncated sum of
+/// The motion that the largest number of `sites` follow, or with `wanted` the site (by its place in the list)
+/// whose motion is requested: of candidates through three sites each the one with the least truncated sum of
 /// squares (P. Torr, A. Zisserman, "MLESAC", CVIU 2000), refitted to the sites that follow it.
-pub(super) fn dominant_motion(sites: &[Site], seed: Option<usize>) -> Option<AffineMotion> {
+pub(super) fn dominant_motion(sites: &[Site], wanted: Option<usize>) -> Option<AffineMotion> {
     let step = sites.len().div_ceil(COMPARED_SITES).max(1);
     let mut compared: Vec<&Site> = sites.iter().step_by(step).collect();
-    let drawn = match seed {
+    let drawn = match wanted {
         None => compared.len(),
-        Some(seed) => {
-            let from = |site: &&Site| (site.x - sites[seed].x).hypot(site.y - sites[seed].y);
+        Some(wanted) => {
+            let from = |site: &&Site| (site.x - sites[wanted].x).hypot(site.y - sites[wanted].y);
             compared.sort_by(|a, b| from(a).total_cmp(&from(b)));
             ((NEAR_SHARE * compared.len() as f64) as usize).max(MIN_NEAR).min(compared.len())
         }
     };
-    // A motion near the seed is judged by the sites near it.
+    // The motion around a site is judged by the sites near it.
     let judged = &compared[..drawn];
     let random = CounterRng::new(0);
     let cost = |motion: &AffineMotion| judged.iter().map(|site| motion.distance(site).min(CHI2_LIMIT)).sum::<f64>();

@@ -2,10 +2,10 @@
 //! with the standard deviation that the covariance of the motion gives it to first order, `sd^2 = grad^T
 //! Cov(m) grad`.
 //!
-//! `quantity` has the names and units, `rate` the rates that displacements stand for, `value` the formulas and
-//! their standard deviations. A region gives one number by its mean motion (`region`) or by the one affine
-//! motion that most of it follows (`dominant` finds it, `region_motion` fits it); both allow for `sharing`,
-//! the pixels that estimates have in common.
+//! `quantity` has the names and units, `rate` the rates that displacements stand for, `value` the formulas
+//! and their standard deviations. A region gives one number by its mean motion (`region`) or by the one
+//! affine motion that most of it follows (`dominant` finds it, `region_motion` fits it); both allow for
+//! `sharing`, the pixels that estimates have in common.
 
 mod dominant;
 mod quantity;

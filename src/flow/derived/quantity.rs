@@ -2,19 +2,19 @@
 
 use crate::types::{Units, choices};
 
-/// A number derived from the affine motion `m = (u, v, u_x, v_x, u_y, v_y)` of a point, in the [`Units`] of its
-/// field.
+/// A number derived from the affine motion `m = (u, v, u_x, v_x, u_y, v_y)` of a point, in the [`Units`] of
+/// its field.
 ///
 /// Everything but the speed, the centre and the time to contact is formed of the rates `L` that make the
 /// field's displacements: `log(I + D)` for the Jacobian `D` of a step to the next frame, `asinh D` for the
-/// mean of the steps before and after (see [`Interval`](crate::types::Interval)). They hold for motion that is
-/// constant within the step.
+/// mean of the steps before and after (see [`Interval`](crate::types::Interval)). They hold for motion that
+/// is constant within the step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Quantity {
     /// `L_xx + L_yy`, 1/frame or 1/s: relative growth of area.
     Divergence,
-    /// `L_yx - L_xy`, 1/frame or 1/s: twice the angular velocity; positive turns x towards y (clockwise on the
-    /// screen).
+    /// `L_yx - L_xy`, 1/frame or 1/s: twice the angular velocity; positive turns x towards y (clockwise on
+    /// the screen).
     Curl,
     /// `sqrt((L_xx - L_yy)^2 + (L_xy + L_yx)^2)`, 1/frame or 1/s: difference of the two principal rates of
     /// strain.

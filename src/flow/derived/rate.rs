@@ -40,8 +40,9 @@ fn inverse_sinh(z: Complex<f64>) -> [Complex<f64>; 4] {
     [z.asinh(), first, -z * cube, (z * z * 2.0 - 1.0) * cube / square]
 }
 
-/// The function of the matrix `D = a I + N` with `N` free of trace, `N^2 = s I` and eigenvalues `a +- sqrt(s)`:
-/// `p I + q N`, with `p` the mean of the function over the eigenvalues and `q` its divided difference.
+/// The function of the matrix `D = a I + N` with `N` free of trace, `N^2 = s I` and eigenvalues `a +-
+/// sqrt(s)`: `p I + q N`, with `p` the mean of the function over the eigenvalues and `q` its divided
+/// difference.
 fn function(series: Series, [ux, vx, uy, vy]: [f64; 4]) -> ([f64; 4], [[f64; 4]; 4]) {
     let (a, half) = (0.5 * (ux + vy), 0.5 * (ux - vy));
     let square = half * half + uy * vx;

@@ -5,6 +5,7 @@ use super::{Motion, Quantity, unbiased_value_and_std, value_and_std};
 use crate::error::{Error, Result};
 use crate::math::{MAD_TO_STD, Real, central_median};
 use crate::types::{FlowField, MOTION_NAMES, Region};
+use nalgebra::{Matrix6, Vector6};
 
 /// Standard error of a median of normal values over that of their mean.
 const MEDIAN_EFFICIENCY: f64 = 1.2533;
@@ -70,11 +71,12 @@ pub(super) fn check<T>(field: &FlowField<T>, quantity: Quantity) -> Result<()> {
     Ok(())
 }
 
-/// One value of a quantity for the sites inside `region` (`None`: all sites): that of their mean motion, so
-/// that ratios, lengths and angles are formed after the mean is.
+/// One value of a quantity for the sites inside `region` (`None`: all sites): that of their mean motion at
+/// their centre, so that ratios, lengths and angles are formed after the mean is.
 ///
 /// Sites are weighted by the inverse variance of what the quantity is a linear combination of, or of what it
-/// is formed of. What noise adds to the length of a vector is taken off.
+/// is formed of. What noise adds to the length of a vector is taken off. NaN where the frames contradict more
+/// than half of the region's estimates.
 ///
 /// # Errors
 /// As [`plane()`]; [`Error::Argument`] naming `region` for one that does not fit the frame, and `aggregate`
@@ -130,6 +132,14 @@ pub(super) fn sites_in<T: Real>(field: &FlowField<T>, region: Option<&Region>) -
     Ok((0..field.len()).filter(is_inside).collect())
 }
 
+/// The valid ones of some sites; `None` where the frames contradict more than half of the estimates: the
+/// others are then no better.
+pub(super) fn valid_sites<T: Real>(field: &FlowField<T>, sites: &[usize]) -> Option<Vec<usize>> {
+    let estimated = sites.iter().filter(|&&index| field.status[index].has_estimate()).count();
+    let valid: Vec<usize> = sites.iter().copied().filter(|&index| field.status[index].is_valid()).collect();
+    (2 * valid.len() >= estimated).then_some(valid)
+}
+
 /// The mean motion of a region for what is formed of `combinations`, and the number of sites that took part.
 fn mean_motion<'a, T: Real>(
     field: &'a FlowField<T>,
@@ -140,8 +150,8 @@ fn mean_motion<'a, T: Real>(
         let expected = "a field with covariance, or the median";
         return Err(Error::argument("aggregate", expected, "a field without covariance"));
     }
-    let mut used = sites_in(field, region)?;
-    used.retain(|&index| field.status[index].is_valid() && field.affine(index).to_array().iter().all(|m| m.finite()));
+    let Some(mut used) = valid_sites(field, &sites_in(field, region)?) else { return Ok(None) };
+    used.retain(|&index| field.affine(index).to_array().iter().all(|value| value.finite()));
     Ok(match aggregate {
         Aggregate::InverseVariance => weighted(field, &used, combinations),
         Aggregate::Median => median(field, &used),
@@ -172,19 +182,26 @@ fn weighted<'a, T: Real>(
         .map(|(index, variance)| (index, if is_exact { 1.0 } else { 1.0 / variance }))
         .collect();
     let total: f64 = sites.iter().map(|(_, weight)| weight).sum();
-    let (mut parameters, mut at) = ([0.0; 6], (0.0, 0.0));
+    let n = sites.len() as f64;
+    let (mut parameters, mut at, mut centre) = ([0.0; 6], (0.0, 0.0), (0.0, 0.0));
     for &(index, weight) in &sites {
         let motion = Motion::at_site(field, index);
         let share = weight / total;
         parameters.iter_mut().zip(motion.parameters).for_each(|(sum, value)| *sum += share * value);
         (at.0, at.1) = (at.0 + share * motion.at.0, at.1 + share * motion.at.1);
+        (centre.0, centre.1) = (centre.0 + motion.at.0 / n, centre.1 + motion.at.1 / n);
     }
-    // Mean squares about the mean, and mean of the claimed covariances.
+    // Where the flow changes over the region a weighted mean belongs to the weighted mean of the places; the
+    // mean Jacobian carries it to their centre.
+    let mean = Vector6::from(parameters);
+    let at_place = |place: (f64, f64)| carry_to(place.0 - at.0, place.1 - at.1) * mean;
+    let step = (centre.0 - at.0, centre.1 - at.1);
+    // Mean squares about the mean motion, and mean of the claimed covariances.
     let (mut spread, mut covariance) = ([[0.0; 6]; 6], [[0.0; 6]; 6]);
     for &(index, weight) in &sites {
         let motion = Motion::at_site(field, index);
         let share = weight / total;
-        let off: [f64; 6] = std::array::from_fn(|p| motion.parameters[p] - parameters[p]);
+        let off = Vector6::from(motion.parameters) - at_place(motion.at);
         for i in 0..6 {
             for j in 0..6 {
                 spread[i][j] += share * off[i] * off[j];
@@ -192,7 +209,7 @@ fn weighted<'a, T: Real>(
             }
         }
     }
-    let (count, n) = (sites.len(), sites.len() as f64);
+    let count = sites.len();
     let indices: Vec<usize> = sites.iter().map(|(index, _)| *index).collect();
     let sharing = sharing_among(&field.layout, field.width, &indices);
     // The larger of the claimed and the observed spread (Birge 1932).
@@ -203,12 +220,27 @@ fn weighted<'a, T: Real>(
     let factor = if is_exact { sharing / n } else { sharing * ratio.max(1.0) * (1.0 - common) / n + common };
     let of_mean = if is_exact { spread } else { covariance };
     let motion = Motion {
-        parameters,
-        covariance: Some(of_mean.map(|row| row.map(|value| factor * value))),
-        at,
+        parameters: at_place(centre).into(),
+        covariance: Some(carried(&of_mean.map(|row| row.map(|value| factor * value)), step)),
+        at: centre,
         ..Motion::at_site(field, *indices.first()?)
     };
     Some((motion, count))
+}
+
+/// `T` that carries an affine motion by the offset `(dx, dy)`: `(u, v, ...)(p) = T m0`.
+pub(super) fn carry_to(dx: f64, dy: f64) -> Matrix6<f64> {
+    let mut carry = Matrix6::identity();
+    (carry[(0, 2)], carry[(0, 4)]) = (dx, dy);
+    (carry[(1, 3)], carry[(1, 5)]) = (dx, dy);
+    carry
+}
+
+/// The covariance of an affine motion carried by `(dx, dy)`.
+fn carried(covariance: &[[f64; 6]; 6], (dx, dy): (f64, f64)) -> [[f64; 6]; 6] {
+    let carry = carry_to(dx, dy);
+    let matrix = carry * Matrix6::from_fn(|i, j| covariance[i][j]) * carry.transpose();
+    std::array::from_fn(|i| std::array::from_fn(|j| matrix[(i, j)]))
 }
 
 /// The median of each parameter, with independent standard deviations.

@@ -1,24 +1,29 @@
 //! One affine motion for a whole region, from the estimates of its sites.
 
-use super::region::sites_in;
+use super::region::{carry_to, sites_in, valid_sites};
 use super::sharing::{in_common, sharing_among};
-use super::{Motion, Quantity, dominant::dominant_motion, region, unbiased_value_and_std};
+use super::{
+    Motion, Quantity,
+    dominant::{Site, dominant_motion},
+    region, unbiased_value_and_std,
+};
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FlowField, MOTION_NAMES, Region, choices};
-use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, SMatrix, Vector2, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix2, Matrix6, Vector2, Vector6};
 
 /// Variance added to every estimate, in squares of px/frame and 1/frame: no estimate is taken for exact.
 const FLOOR: f64 = 1e-14;
 
-/// Whether a region has the motion that was asked for.
+/// Whether a region has the requested motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RegionStatus {
-    /// More than half of its sites follow one affine motion, or the site at the given point does.
+    /// More than half of its valid sites follow one affine motion, or the site at the given point does.
     Ok,
     /// No motion is that of most sites, or the site at the given point differs from its neighbours.
     NoDominantMotion,
-    /// Too few valid sites to determine an affine motion.
+    /// Too few valid sites to determine an affine motion, or the frames contradict more than half of the
+    /// estimates.
     TooFewSites,
 }
 
@@ -37,8 +42,6 @@ pub struct RegionMotion {
     pub count: usize,
     /// Sites in the region with a valid estimate.
     pub valid: usize,
-    /// Sites in the region with an estimate, those included that the frames contradict.
-    pub estimated: usize,
     /// Sites in the region.
     pub sites: usize,
     /// Whether the motion can be used.
@@ -46,31 +49,14 @@ pub struct RegionMotion {
 }
 
 impl RegionMotion {
-    /// Share of the sites with an estimate that follow the motion, 0 to 1. A site that the frames contradict
-    /// follows none.
+    /// Share of the valid sites that follow the motion, 0 to 1.
     pub fn share(&self) -> f64 {
-        self.count as f64 / self.estimated.max(1) as f64
+        self.count as f64 / self.valid.max(1) as f64
     }
 
     /// Share of the region's sites that have a valid estimate, 0 to 1.
     pub fn valid_share(&self) -> f64 {
         self.valid as f64 / self.sites.max(1) as f64
-    }
-}
-
-/// The flow of a site in px/frame, at its place from the centre in px.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Site {
-    index: usize,
-    pub(super) x: f64,
-    pub(super) y: f64,
-    pub(super) flow: Vector2<f64>,
-    pub(super) covariance: Matrix2<f64>,
-}
-
-impl Site {
-    pub(super) fn place(&self) -> Vector3<f64> {
-        Vector3::new(1.0, self.x, self.y)
     }
 }
 
@@ -99,7 +85,7 @@ pub fn measure_parameter(place: usize, fit: &RegionMotion) -> (f64, f64) {
 }
 
 /// Fits one affine motion `m0` about the centre to the estimates `m_i` (covariance `C_i`) of the valid sites
-/// in `region` (`None`: all) that follow the motion of most of them, or with `seed`, a pixel `(x, y)`, that of
+/// in `region` (`None`: all) that follow the motion of most of them, or with `at`, a pixel `(x, y)`, that of
 /// the sites around it: `min sum (m_i - T_i m0)^T C_i^-1 (m_i - T_i m0)`, where `T_i` carries the affine
 /// motion from the centre to the site.
 ///
@@ -109,22 +95,22 @@ pub fn measure_parameter(place: usize, fit: &RegionMotion) -> (f64, f64) {
 /// have an error in common, which does not shrink with their number: the covariance holds it in full.
 ///
 /// # Errors
-/// [`Error::Argument`] naming `region` or `seed` where they do not fit the frame, `covariance` for a field
+/// [`Error::Argument`] naming `region` or `at` where they do not fit the frame, `covariance` for a field
 /// without one.
 pub fn fit_region<T: Real>(
     field: &FlowField<T>,
     region: Option<&Region>,
-    seed: Option<(f64, f64)>,
+    at: Option<(f64, f64)>,
 ) -> Result<RegionMotion> {
     if field.covariance.is_none() {
         return Err(Error::argument("field", "one with covariance", "one without"));
     }
     let (width, height) = field.layout.frame_size;
-    if let Some((x, y)) = seed
+    if let Some((x, y)) = at
         && !(x >= 0.0 && y >= 0.0 && x <= (width - 1) as f64 && y <= (height - 1) as f64)
     {
         let expected = format!("a pixel (x, y) inside the {width} x {height} frame");
-        return Err(Error::argument("seed", expected, format!("({x}, {y})")));
+        return Err(Error::argument("at", expected, format!("({x}, {y})")));
     }
     let pixel = |index: usize| {
         let (x, y) = field.layout.sites.pixel(index % field.width, index / field.width);
@@ -135,9 +121,10 @@ pub fn fit_region<T: Real>(
     let sum = inside.iter().map(|&index| pixel(index)).fold((0.0, 0.0), |sum, at| (sum.0 + at.0, sum.1 + at.1));
     let centre = (sum.0 / n, sum.1 / n);
     let scale = [field.layout.units.scale("u"), field.layout.units.scale("v")];
-    let sites: Vec<Site> = inside
+    let valid = valid_sites(field, &inside);
+    let sites: Vec<Site> = valid
         .iter()
-        .filter(|&&index| field.status[index].is_valid())
+        .flatten()
         .filter_map(|&index| {
             let motion = Motion::at_site(field, index);
             let covariance = motion.covariance?;
@@ -155,7 +142,6 @@ pub fn fit_region<T: Real>(
         centre,
         count: 0,
         valid: sites.len(),
-        estimated: inside.iter().filter(|&&index| field.status[index].has_estimate()).count(),
         sites: inside.len(),
         status: RegionStatus::TooFewSites,
     };
@@ -163,11 +149,11 @@ pub fn fit_region<T: Real>(
         let from = |site: &Site| (site.x + centre.0 - x).hypot(site.y + centre.1 - y);
         (0..sites.len()).min_by(|&a, &b| from(&sites[a]).total_cmp(&from(&sites[b])))
     };
-    let seed = seed.and_then(nearest);
-    let Some(dominant) = dominant_motion(&sites, seed) else { return Ok(unknown) };
+    let wanted = at.and_then(nearest);
+    let Some(dominant) = dominant_motion(&sites, wanted) else { return Ok(unknown) };
     let followers: Vec<usize> = sites.iter().filter(|site| dominant.holds(site)).map(|site| site.index).collect();
     let count = followers.len();
-    let is_found = seed.map_or(2 * count > unknown.estimated, |seed| dominant.holds(&sites[seed]));
+    let is_found = wanted.map_or(2 * count > sites.len(), |wanted| dominant.holds(&sites[wanted]));
     if !is_found {
         return Ok(RegionMotion { count, status: RegionStatus::NoDominantMotion, ..unknown });
     }
@@ -216,14 +202,6 @@ fn least_squares<T: Real>(
         covariance += Matrix6::from_fn(|i, j| whole[(i, j)]);
     }
     Some((motion.into(), covariance.transpose().into()))
-}
-
-/// `(u, v, ...)(p) = T m0` at the offset `(dx, dy)`.
-fn carry_to(dx: f64, dy: f64) -> SMatrix<f64, 6, 6> {
-    let mut carry = Matrix6::identity();
-    (carry[(0, 2)], carry[(0, 4)]) = (dx, dy);
-    (carry[(1, 3)], carry[(1, 5)]) = (dx, dy);
-    carry
 }
 
 /// Which of the six parameters the model estimates.

@@ -49,8 +49,8 @@ pub fn value_and_std(quantity: Quantity, motion: &Motion<'_>) -> (f64, Option<f6
     evaluate(quantity, motion, false)
 }
 
-/// As [`value_and_std`], without what noise adds to the length of a vector: `|d|^2 - trace(Cov d)` in place of
-/// the square, not below 0.
+/// As [`value_and_std`], without what noise adds to the length of a vector: `|d|^2 - trace(Cov d)` in place
+/// of the square, not below 0.
 pub fn unbiased_value_and_std(quantity: Quantity, motion: &Motion<'_>) -> (f64, Option<f64>) {
     evaluate(quantity, motion, true)
 }

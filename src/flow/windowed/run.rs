@@ -13,7 +13,7 @@ use crate::flow::site::{FieldBand, bands};
 use crate::flow::symmetric::upper;
 use crate::image::{GaussianSmoother, are_rounded};
 use crate::jet::{JetRows, JetStencil};
-use crate::parallel::BAND_ROWS;
+use crate::parallel::{BAND_ROWS, checkpoint};
 use crate::simd::{Lanes, Level, SimdReal};
 use crate::types::{FlowField, Frame, Mask, Rect, SamplingGrid, Status};
 use rayon::prelude::*;
@@ -68,6 +68,7 @@ impl Windowed {
                 let span = |count: usize| (count - 1) * stride + 1;
                 let mut bands = bands(field);
                 for (strip, bands) in bands.chunks_mut(STRIP_ROWS / BAND_ROWS).enumerate() {
+                    checkpoint();
                     let first = strip * STRIP_ROWS;
                     let (x, y) = sites.pixel(0, first);
                     let height = span((rows - first).min(STRIP_ROWS));

@@ -72,8 +72,11 @@ pub fn check_sink(spec: &str) -> Result<()> {
 }
 
 fn kind_of(spec: &str) -> Result<&'static Kind> {
+    let wanted = "*.npy, *.y4m, - for Y4M on standard output, or a folder (for PNG files)";
+    if spec.is_empty() {
+        return Err(Error::argument("output", wanted, "an empty name"));
+    }
     KINDS.iter().find(|kind| (kind.accepts)(spec)).ok_or_else(|| {
-        let wanted = "*.npy, *.y4m, - for Y4M on standard output, or a folder (for PNG files)";
         Error::argument("output", wanted, format!("{spec}; for a new folder of this name write {spec}/"))
     })
 }

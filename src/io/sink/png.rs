@@ -21,7 +21,8 @@ pub struct PngSink {
 }
 
 impl PngSink {
-    /// Files in `folder`, which is made when it does not exist.
+    /// Files in `folder`, which is made when it does not exist. The first frame removes those of an earlier
+    /// sink.
     pub fn create(folder: impl AsRef<Path>) -> Result<Self> {
         Ok(Self { files: NumberedFiles::create(folder, "frame", "png")?, next: 0, uniform: Uniform::default() })
     }
@@ -29,7 +30,9 @@ impl PngSink {
 
 impl FrameSink for PngSink {
     fn write(&mut self, frame: &AnyFrame) -> Result<()> {
-        self.uniform.check(frame)?;
+        if self.uniform.check(frame)? {
+            self.files.clear()?;
+        }
         write_frame_png(self.files.path(self.next), frame)?;
         self.next += 1;
         Ok(())
@@ -41,7 +44,9 @@ impl FrameSink for PngSink {
 
 impl FrameSink<AnyColourFrame> for PngSink {
     fn write(&mut self, frame: &AnyColourFrame) -> Result<()> {
-        self.uniform.check(frame)?;
+        if self.uniform.check(frame)? {
+            self.files.clear()?;
+        }
         write_colour_png(self.files.path(self.next), frame)?;
         self.next += 1;
         Ok(())

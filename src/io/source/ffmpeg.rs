@@ -3,16 +3,19 @@
 use super::{FrameSource, Kind, Y4mSource};
 use crate::error::{Error, Result};
 use crate::io::channels::{ChannelPolicy, Colour, ColourUse};
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Stdio};
+use tempfile::TempDir;
 
 pub(super) const KIND: Kind = Kind {
     name: "ffmpeg",
     accepts: |spec| Path::new(spec).is_file(),
-    open: |spec, policy| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, policy)?)),
-    open_colour: |spec, policy| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, policy)?)),
+    has_planes: false,
+    open: |spec, options| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, options.colour)?)),
+    open_colour: |spec, options| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, options.grey)?)),
 };
 
 /// "Every coded frame once": for `ffmpeg` 5.1 and later, and for earlier ones.
@@ -20,24 +23,75 @@ const EVERY_FRAME: [[&str; 2]; 2] = [["-fps_mode", "passthrough"], ["-vsync", "0
 
 /// Conversion to what [`Y4mSource`] takes colour for, from any matrix and depth of the file. Limited range,
 /// since older programs say nothing of the range.
-const COLOUR: [&str; 2] = ["-vf", "scale=out_color_matrix=bt601:out_range=tv,format=yuv444p"];
+const COLOUR: &str = "scale=out_color_matrix=bt601:out_range=tv,format=yuv444p";
+
+/// The formats of Y4M: a video in one of them stays as it is, others (RGB, palettes) take the nearest.
+const GREY: &str = "format=gray|gray10le|gray12le|gray16le|yuv420p|yuv411p|yuv422p|yuv444p|yuvj420p|yuvj422p|yuvj444p|yuv420p10le|yuv422p10le|yuv444p10le|yuv420p12le|yuv422p12le|yuv444p12le|yuv420p16le|yuv422p16le|yuv444p16le";
+
+/// Writes a line with the time of each frame, before the frame, into a file of the program's folder.
+const TIMES: &str = "metadata=mode=add:key=jacoflow:value=1,metadata=mode=print:key=jacoflow:file=times:direct=1";
+
+/// Name of that file.
+const TIMES_FILE: &str = "times";
 
 /// Frames of a video file. Grey ones are the luma plane as coded, 8 to 16 bit (see [`Y4mSource`]); colour
-/// ones have 8 bit, converted by the program.
+/// ones have 8 bit, converted by the program. Frames are turned as the file says for the display.
 ///
 /// The program runs beside this process and is stopped when the source is dropped.
 #[derive(Debug)]
 pub struct FfmpegSource<P = Colour> {
     path: PathBuf,
     stream: Y4mSource<BufReader<ChildStdout>, P>,
+    times: Times,
     running: Running,
 }
 
-/// The program, stopped on drop, and the file that takes its messages.
+/// The program, stopped on drop, the file that takes its messages, and its folder.
 #[derive(Debug)]
 struct Running {
     child: Child,
     messages: File,
+    folder: TempDir,
+}
+
+/// Times of the frames, s, as the program writes them.
+#[derive(Debug)]
+struct Times {
+    /// `None` where the program writes none.
+    file: Option<File>,
+    /// The beginning of a line whose end has not been written yet.
+    rest: String,
+    waiting: VecDeque<Option<f64>>,
+    last: Option<f64>,
+}
+
+impl Times {
+    fn of(folder: &Path) -> Self {
+        let file = File::open(folder.join(TIMES_FILE)).ok();
+        Self { file, rest: String::new(), waiting: VecDeque::new(), last: None }
+    }
+
+    /// Goes on by `count` frames.
+    fn pass(&mut self, count: usize) {
+        for _ in 0..count {
+            if self.waiting.is_empty() {
+                self.read();
+            }
+            self.last = self.waiting.pop_front().flatten();
+        }
+    }
+
+    fn read(&mut self) {
+        let Some(file) = &mut self.file else { return };
+        let mut bytes = Vec::new();
+        // A failure leaves frames without times, which is no reason to stop.
+        let _ = file.take(1 << 20).read_to_end(&mut bytes);
+        self.rest.push_str(&String::from_utf8_lossy(&bytes));
+        let end = self.rest.rfind('\n').map_or(0, |at| at + 1);
+        let lines: String = self.rest.drain(..end).collect();
+        let times = lines.lines().filter(|line| line.starts_with("frame:"));
+        self.waiting.extend(times.map(|line| line.split_once("pts_time:")?.1.trim().parse().ok()));
+    }
 }
 
 impl FfmpegSource {
@@ -57,19 +111,23 @@ impl<P: ChannelPolicy> FfmpegSource<P> {
     pub fn open_with(program: impl AsRef<Path>, path: impl AsRef<Path>, policy: P) -> Result<Self> {
         let (program, path) = (program.as_ref(), path.as_ref());
         File::open(path).map_err(|e| Error::io(path, e))?;
-        let conversion: &[&str] = if policy.colour_use() == ColourUse::Kept { &COLOUR } else { &[] };
+        let conversion = if policy.colour_use() == ColourUse::Kept { COLOUR } else { GREY };
+        let with_times = format!("{conversion},{TIMES}");
         let mut failure = None;
-        for every_frame in EVERY_FRAME {
-            let mut running = Running::start(program, path, every_frame, conversion)?;
+        // Older programs do not know "-fps_mode", or write no times as frames are decoded.
+        let ways = [(EVERY_FRAME[0], &*with_times), (EVERY_FRAME[1], &*with_times), (EVERY_FRAME[1], conversion)];
+        for (every_frame, filters) in ways {
+            let mut running = Running::start(program, path, every_frame, filters)?;
             let Some(output) = running.child.stdout.take() else { break };
             match Y4mSource::new(path, BufReader::with_capacity(1 << 18, output)) {
                 Ok(stream) => {
-                    return Ok(Self { path: path.to_path_buf(), stream: stream.with_policy(policy), running });
+                    let (times, path) = (Times::of(running.folder.path()), path.to_path_buf());
+                    return Ok(Self { path, stream: stream.with_policy(policy), times, running });
                 }
                 Err(error) => failure = Some(running.explain(path, error)),
             }
-            // Only a program that does not know the option deserves the older spelling.
-            if !failure.as_ref().is_some_and(|e| e.to_string().contains("fps_mode")) {
+            let is_older = |words: &str| words.contains("fps_mode") || words.contains("direct");
+            if !failure.as_ref().is_some_and(|error| is_older(&error.to_string())) {
                 break;
             }
         }
@@ -78,18 +136,21 @@ impl<P: ChannelPolicy> FfmpegSource<P> {
 }
 
 impl Running {
-    fn start(program: &Path, path: &Path, every_frame: [&str; 2], conversion: &[&str]) -> Result<Self> {
-        let messages = tempfile::tempfile().map_err(|e| Error::io(std::env::temp_dir(), e))?;
-        let for_child = messages.try_clone().map_err(|e| Error::io(std::env::temp_dir(), e))?;
+    fn start(program: &Path, path: &Path, every_frame: [&str; 2], filters: &str) -> Result<Self> {
+        let temporary = |e| Error::io(std::env::temp_dir(), e);
+        let messages = tempfile::tempfile().map_err(temporary)?;
+        let for_child = messages.try_clone().map_err(temporary)?;
+        let folder = tempfile::tempdir().map_err(temporary)?;
         // A name that begins with a dash or holds a colon must not be taken for an option or a protocol.
         let mut input = std::ffi::OsString::from("file:");
-        input.push(path);
+        input.push(std::path::absolute(path).map_err(|e| Error::io(path, e))?);
         let child = Command::new(program)
+            .current_dir(folder.path())
             .args(["-nostdin", "-v", "error", "-i"])
             .arg(input)
             .args(["-map", "0:v:0"])
             .args(every_frame)
-            .args(conversion)
+            .args(["-vf", filters])
             .args(["-strict", "-1", "-f", "yuv4mpegpipe", "-"])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -103,7 +164,7 @@ impl Running {
                 )),
                 _ => Error::io(program, e),
             })?;
-        Ok(Self { child, messages })
+        Ok(Self { child, messages, folder })
     }
 
     /// The end of what the program said.
@@ -147,11 +208,19 @@ impl<P: ChannelPolicy> FrameSource<P::Frame> for FfmpegSource<P> {
         match self.stream.next_frame() {
             Ok(None) => self.running.finish(&self.path).map(|()| None),
             Err(error) => Err(self.running.explain(&self.path, error)),
-            frame => frame,
+            frame => {
+                self.times.pass(1);
+                frame
+            }
         }
     }
     fn skip(&mut self, count: usize) -> Result<usize> {
-        self.stream.skip(count).map_err(|error| self.running.explain(&self.path, error))
+        let passed = self.stream.skip(count).map_err(|error| self.running.explain(&self.path, error))?;
+        self.times.pass(passed);
+        Ok(passed)
+    }
+    fn time(&self) -> Option<f64> {
+        self.times.last.or_else(|| self.stream.time())
     }
     fn frame_rate(&self) -> Option<f64> {
         self.stream.frame_rate()

@@ -3,7 +3,9 @@
 use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
 use crate::io::channels::{ChannelPolicy, Colour, FrameFormat};
-use crate::io::decode::{EXTENSIONS, TiffPages, is_tiff, read_image};
+use crate::io::decode::{EXTENSIONS, is_tiff, read_plane};
+use crate::io::pages::Pages;
+use crate::io::planes::{PixelSize, PlaneSelection};
 use std::path::{Path, PathBuf};
 
 pub(super) const KIND: Kind = Kind {
@@ -11,8 +13,9 @@ pub(super) const KIND: Kind = Kind {
     accepts: |spec| {
         Path::new(spec).is_dir() || (has_extension(spec, EXTENSIONS) && (Path::new(spec).exists() || !is_pattern(spec)))
     },
-    open: open_files,
-    open_colour: open_files,
+    has_planes: true,
+    open: |spec, options| open_files(spec, options.colour, options.planes),
+    open_colour: |spec, options| open_files(spec, options.grey, options.planes),
 };
 
 /// Whether the text has a pattern's special characters.
@@ -20,15 +23,20 @@ pub(super) fn is_pattern(spec: &str) -> bool {
     spec.contains(['*', '?', '['])
 }
 
-fn open_files<P: ChannelPolicy>(spec: &str, policy: P) -> Result<Box<dyn FrameSource<P::Frame>>> {
+fn open_files<P: ChannelPolicy>(
+    spec: &str,
+    policy: P,
+    planes: PlaneSelection,
+) -> Result<Box<dyn FrameSource<P::Frame>>> {
     let path = Path::new(spec);
     if path.is_dir() {
-        return Ok(Box::new(FilesSource::new(images_in(path)?, policy)?));
+        return Ok(Box::new(FilesSource::new(images_in(path)?, policy)?.with_planes(planes)));
     }
     if is_tiff(path)? {
-        return Ok(Box::new(PagesSource::open(path, policy)?));
+        let pages = Pages::open(path, policy, planes)?;
+        return Ok(Box::new(PagesSource { path: path.to_path_buf(), pages, uniform: Uniform::default() }));
     }
-    Ok(Box::new(FilesSource::new(vec![path.to_path_buf()], policy)?))
+    Ok(Box::new(FilesSource::new(vec![path.to_path_buf()], policy)?.with_planes(planes)))
 }
 
 /// The image files of a folder, not hidden, in natural order (`frame9` before `frame10`).
@@ -80,12 +88,15 @@ impl Uniform {
     }
 }
 
-/// One frame a file, in the order given, by the policies [`Colour`] and [`Grey`](crate::io::Grey).
+/// One frame a file, in the order given, by the policies [`Colour`] and [`Grey`](crate::io::Grey). A TIFF
+/// file of several pages is an [`Error::Format`], unless a channel and slice are selected of which it has
+/// one.
 #[derive(Debug)]
 pub struct FilesSource<P = Colour> {
     paths: Vec<PathBuf>,
     next: usize,
     policy: P,
+    planes: PlaneSelection,
     uniform: Uniform,
 }
 
@@ -98,14 +109,19 @@ impl<P: ChannelPolicy> FilesSource<P> {
         if paths.is_empty() {
             return Err(Error::argument("frames", "at least one image file", "none"));
         }
-        Ok(Self { paths, next: 0, policy, uniform: Uniform::default() })
+        Ok(Self { paths, next: 0, policy, planes: PlaneSelection::default(), uniform: Uniform::default() })
+    }
+
+    /// The same with the plane to take of each file, for TIFF files with several channels or slices.
+    pub fn with_planes(self, planes: PlaneSelection) -> Self {
+        Self { planes, ..self }
     }
 }
 
 impl<P: ChannelPolicy> FrameSource<P::Frame> for FilesSource<P> {
     fn next_frame(&mut self) -> Result<Option<P::Frame>> {
         let Some(path) = self.paths.get(self.next) else { return Ok(None) };
-        let frame = read_image(path, self.policy)?;
+        let frame = read_plane(path, self.policy, self.planes)?;
         self.uniform.check(path, &frame)?;
         self.next += 1;
         Ok(Some(frame))
@@ -131,42 +147,32 @@ impl<P: ChannelPolicy> FrameSource<P::Frame> for FilesSource<P> {
 #[derive(Debug)]
 struct PagesSource<P> {
     path: PathBuf,
-    pages: TiffPages<P>,
-    left: usize,
+    pages: Pages<P>,
     uniform: Uniform,
-}
-
-impl<P: ChannelPolicy> PagesSource<P> {
-    fn open(path: &Path, policy: P) -> Result<Self> {
-        let mut counted = TiffPages::open(path, policy)?;
-        let mut left = 0;
-        while counted.skip_page()? {
-            left += 1;
-        }
-        Ok(Self { path: path.to_path_buf(), pages: TiffPages::open(path, policy)?, left, uniform: Uniform::default() })
-    }
 }
 
 impl<P: ChannelPolicy> FrameSource<P::Frame> for PagesSource<P> {
     fn next_frame(&mut self) -> Result<Option<P::Frame>> {
-        let frame = self.pages.next_page()?;
+        let frame = self.pages.next_frame()?;
         if let Some(frame) = &frame {
             self.uniform.check(&self.path, frame)?;
-            self.left = self.left.saturating_sub(1);
         }
         Ok(frame)
     }
     fn skip(&mut self, count: usize) -> Result<usize> {
-        for done in 0..count {
-            if !self.pages.skip_page()? {
-                return Ok(done);
-            }
-            self.left = self.left.saturating_sub(1);
-        }
-        Ok(count)
+        Ok(self.pages.skip(count))
     }
     fn len_hint(&self) -> Option<usize> {
-        Some(self.left)
+        Some(self.pages.left())
+    }
+    fn frame_rate(&self) -> Option<f64> {
+        self.pages.frame_rate()
+    }
+    fn time(&self) -> Option<f64> {
+        self.pages.time()
+    }
+    fn pixel_size(&self) -> Option<PixelSize> {
+        self.pages.pixel_size().cloned()
     }
     fn describe(&self) -> String {
         format!("{} (TIFF)", self.path.display())

@@ -8,8 +8,11 @@ use std::path::PathBuf;
 pub(super) const KIND: Kind = Kind {
     name: "glob",
     accepts: is_pattern,
-    open: |spec, policy| Ok(Box::new(FilesSource::new(matches(spec)?, policy)?)),
-    open_colour: |spec, policy| Ok(Box::new(FilesSource::new(matches(spec)?, policy)?)),
+    has_planes: true,
+    open: |spec, options| Ok(Box::new(FilesSource::new(matches(spec)?, options.colour)?.with_planes(options.planes))),
+    open_colour: |spec, options| {
+        Ok(Box::new(FilesSource::new(matches(spec)?, options.grey)?.with_planes(options.planes)))
+    },
 };
 
 fn matches(pattern: &str) -> Result<Vec<PathBuf>> {

@@ -9,8 +9,13 @@ use std::path::{Path, PathBuf};
 pub(super) const KIND: Kind = Kind {
     name: "list",
     accepts: |spec| has_extension(spec, &["txt", "lst"]),
-    open: |spec, policy| Ok(Box::new(FilesSource::new(listed(Path::new(spec))?, policy)?)),
-    open_colour: |spec, policy| Ok(Box::new(FilesSource::new(listed(Path::new(spec))?, policy)?)),
+    has_planes: true,
+    open: |spec, options| {
+        Ok(Box::new(FilesSource::new(listed(Path::new(spec))?, options.colour)?.with_planes(options.planes)))
+    },
+    open_colour: |spec, options| {
+        Ok(Box::new(FilesSource::new(listed(Path::new(spec))?, options.grey)?.with_planes(options.planes)))
+    },
 };
 
 /// Longest list read, bytes.

@@ -7,6 +7,7 @@ mod list;
 mod memory;
 mod npy;
 mod select;
+mod unreadable;
 mod views;
 mod y4m;
 
@@ -18,19 +19,22 @@ pub use select::Selected;
 pub use views::{ViewLayout, ViewPairs};
 pub use y4m::Y4mSource;
 
+use super::planes::{PixelSize, PlaneSelection};
 use super::{channels::Colour, channels::Grey};
 use crate::error::{Error, Result};
 use crate::types::{AnyColourFrame, AnyFrame};
 use std::path::Path;
 
-/// How a source is opened: what to do with colour or grey, and the range of frames, `start`,
-/// `start + step`, ... below `stop`.
+/// How a source is opened: what to do with colour or grey, which planes of a file with channels or slices are
+/// frames, and the range of frames, `start`, `start + step`, ... below `stop`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct OpenOptions {
     /// What [`open`] does with colour pictures; default: refuse.
     pub colour: Colour,
     /// What [`open_colour`] does with grey pictures; default: refuse.
     pub grey: Grey,
+    /// Channel and slice of TIFF files that have several; default: such files are refused.
+    pub planes: PlaneSelection,
     /// Index of the first frame; default 0.
     pub start: usize,
     /// Index after the last frame; default `None`: all frames.
@@ -41,7 +45,8 @@ pub struct OpenOptions {
 
 impl Default for OpenOptions {
     fn default() -> Self {
-        Self { colour: Colour::Error, grey: Grey::Error, start: 0, stop: None, step: 1 }
+        let planes = PlaneSelection::default();
+        Self { colour: Colour::Error, grey: Grey::Error, planes, start: 0, stop: None, step: 1 }
     }
 }
 
@@ -73,6 +78,16 @@ pub trait FrameSource<F = AnyFrame>: Send {
         None
     }
 
+    /// Time of the frame delivered last, s, where the source has times of frames.
+    fn time(&self) -> Option<f64> {
+        None
+    }
+
+    /// Physical size of a pixel, where the source says so.
+    fn pixel_size(&self) -> Option<PixelSize> {
+        None
+    }
+
     /// What this is, for messages.
     fn describe(&self) -> String;
 }
@@ -90,6 +105,12 @@ impl<F, S: FrameSource<F> + ?Sized> FrameSource<F> for Box<S> {
     fn frame_rate(&self) -> Option<f64> {
         (**self).frame_rate()
     }
+    fn time(&self) -> Option<f64> {
+        (**self).time()
+    }
+    fn pixel_size(&self) -> Option<PixelSize> {
+        (**self).pixel_size()
+    }
     fn describe(&self) -> String {
         (**self).describe()
     }
@@ -102,12 +123,14 @@ pub type ColourSource = dyn FrameSource<AnyColourFrame>;
 struct Kind {
     name: &'static str,
     accepts: fn(&str) -> bool,
-    open: fn(&str, Colour) -> Result<Box<dyn FrameSource>>,
-    open_colour: fn(&str, Grey) -> Result<Box<ColourSource>>,
+    /// Whether its files may be TIFF, with channels and slices.
+    has_planes: bool,
+    open: fn(&str, &OpenOptions) -> Result<Box<dyn FrameSource>>,
+    open_colour: fn(&str, &OpenOptions) -> Result<Box<ColourSource>>,
 }
 
 /// Every kind of source; the first that accepts a specification opens it.
-const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KIND, ffmpeg::KIND];
+const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KIND, unreadable::KIND, ffmpeg::KIND];
 
 /// Opens a source of grey frames by its specification.
 ///
@@ -115,18 +138,20 @@ const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KI
 /// |---|---|
 /// | `-` | Y4M on standard input |
 /// | `*.y4m` | Y4M file; its luma plane, where the others are grey or luminance is requested |
-/// | `*.npy` | stack `(T, H, W)` or one frame `(H, W)` of uint8, uint16, float32 or float64; colour `(T, H, W, 3)` |
+/// | `*.npy` | stack `(T, H, W)` or one frame `(H, W)` of numbers; colour `(T, H, W, 3)` |
 /// | `*.txt`, `*.lst` | list of image files, one a line |
 /// | a folder | its PNG, TIFF, BMP, PGM and JPEG files in natural order |
-/// | an image file | its picture, or the pages of a TIFF |
+/// | an image file | its picture, or the pages of a TIFF (along time, see [`PlaneSelection`]) |
 /// | `*`, `?`, `[` in it | the image files it matches, in natural order |
+/// | `*.npz`, `*.h5`, `*.mat`, `*.raw`, `*.mraw`, `*.cine` | refused, with what can be done |
 /// | another file | compressed video, through an `ffmpeg` on the `PATH`; likewise |
 ///
 /// # Errors
 /// [`Error::Io`] when there is nothing of that name, [`Error::Format`] when it is not what it seems,
-/// [`Error::Argument`] for a `step` of 0, [`Error::Missing`] for video without `ffmpeg`.
+/// [`Error::Argument`] for a `step` of 0 or a plane that it does not have, [`Error::Missing`] for video
+/// without `ffmpeg` and for files that only the Python package reads.
 pub fn open(spec: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
-    let source = (kind_for(spec, options)?.open)(spec, options.colour)?;
+    let source = (kind_for(spec, options)?.open)(spec, options)?;
     Ok(Box::new(Selected::new(source, options)?))
 }
 
@@ -137,7 +162,7 @@ pub fn open(spec: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
 /// pictures are an [`Error::Format`] that says that colour is needed, unless `options.grey` is
 /// [`Grey::Repeat`].
 pub fn open_colour(spec: &str, options: &OpenOptions) -> Result<Box<ColourSource>> {
-    let source = (kind_for(spec, options)?.open_colour)(spec, options.grey)?;
+    let source = (kind_for(spec, options)?.open_colour)(spec, options)?;
     Ok(Box::new(Selected::new(source, options)?))
 }
 
@@ -145,7 +170,13 @@ fn kind_for(spec: &str, options: &OpenOptions) -> Result<&'static Kind> {
     if options.step == 0 {
         return Err(Error::argument("step", "a positive integer", 0));
     }
-    KINDS.iter().find(|kind| (kind.accepts)(spec)).ok_or_else(|| nothing_there(spec))
+    let kind = KINDS.iter().find(|kind| (kind.accepts)(spec)).ok_or_else(|| nothing_there(spec))?;
+    match options.planes.given() {
+        Some(option) if !kind.has_planes => {
+            Err(Error::argument(option, "none, as only TIFF files name such an axis", spec))
+        }
+        _ => Ok(kind),
+    }
 }
 
 /// The name of the kind of source that `spec` would be opened as.

@@ -2,6 +2,7 @@
 
 use super::{FrameSource, OpenOptions};
 use crate::error::{Error, Result};
+use crate::io::planes::PixelSize;
 
 /// The frames `start`, `start + step`, ... below `stop` of another source.
 #[derive(Debug)]
@@ -51,6 +52,12 @@ impl<F, S: FrameSource<F>> FrameSource<F> for Selected<S> {
     }
     fn frame_rate(&self) -> Option<f64> {
         self.inner.frame_rate().map(|rate| rate / self.step as f64)
+    }
+    fn time(&self) -> Option<f64> {
+        self.inner.time()
+    }
+    fn pixel_size(&self) -> Option<PixelSize> {
+        self.inner.pixel_size()
     }
     fn describe(&self) -> String {
         self.inner.describe()

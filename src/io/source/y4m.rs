@@ -3,7 +3,7 @@
 use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
 use crate::io::channels::{ChannelPolicy, Channels, Colour, ColourUse, refuse_colour};
-use crate::io::decode::check_size;
+use crate::io::limits::check_size;
 use crate::io::ycbcr::Coding;
 use crate::types::Sample;
 use std::fs::File;
@@ -13,8 +13,9 @@ use std::path::{Path, PathBuf};
 pub(super) const KIND: Kind = Kind {
     name: "y4m",
     accepts: |spec| spec == "-" || has_extension(spec, &["y4m"]),
-    open: open_stream,
-    open_colour: open_stream,
+    has_planes: false,
+    open: |spec, options| open_stream(spec, options.colour),
+    open_colour: |spec, options| open_stream(spec, options.grey),
 };
 
 fn open_stream<P: ChannelPolicy>(spec: &str, policy: P) -> Result<Box<dyn FrameSource<P::Frame>>> {
@@ -290,6 +291,9 @@ impl<R: BufRead + Send, P: ChannelPolicy> FrameSource<P::Frame> for Y4mSource<R,
     }
     fn frame_rate(&self) -> Option<f64> {
         self.frame_rate
+    }
+    fn time(&self) -> Option<f64> {
+        Some(self.frame.checked_sub(1)? as f64 / self.frame_rate?)
     }
     fn describe(&self) -> String {
         format!("{} (Y4M, {} x {}, {} bit)", self.name.display(), self.width, self.height, self.layout.bits)

@@ -6,6 +6,7 @@ use crate::mixture::densities::Densities;
 use crate::mixture::expectation::{Expected, expect};
 use crate::mixture::moments::Moments;
 use crate::mixture::points::{Planes, Points};
+use crate::parallel::checkpoint;
 
 /// What rounds of expectation-maximization lead to, in coordinates about the mean of the points.
 #[derive(Debug)]
@@ -53,6 +54,7 @@ impl<'a> Problem<'a> {
         let mut last = f64::NAN;
         let mut rounds = 0;
         loop {
+            checkpoint();
             moments = moments.reordered(&by_weight(&moments.counts));
             let components = Components::maximised(self.scorer.prior(), self.options, &moments);
             let (used, densities) = components.densities()?;

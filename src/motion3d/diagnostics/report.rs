@@ -102,7 +102,7 @@ pub(crate) fn set_motion(
         out.direction_std = direction_deviation(covariance);
         out.rotation_std = std::array::from_fn(|i| covariance[(2 + i, 2 + i)].sqrt());
     }
-    if let Some(plugged) = plugged(&here.h, &here.p) {
+    if let Some(plugged) = plugged(&here.h, &here.p).filter(|_| covariance.is_some()) {
         out.bound = nested(&plugged.bound);
     }
 }
@@ -185,9 +185,9 @@ pub(crate) fn doubted(found: MotionEstimate, all: &Observations, kept: &Consensu
 }
 
 /// Factor `f / (f - 2)` of a covariance in units of an estimated variance: the variance of Student's
-/// distribution with `f` degrees of freedom (W. Gosset 1908). Truncated residuals (`cut`) have fewer.
-pub(crate) fn of_estimated_noise(points: usize, cut: bool) -> f64 {
+/// distribution with `f` degrees of freedom (W. Gosset 1908). Truncated residuals (`cut`) have fewer. `None`
+/// up to two, whose variance is infinite.
+pub(crate) fn of_estimated_noise(points: usize, cut: bool) -> Option<f64> {
     let free = points.saturating_sub(5) as f64 * if cut { TRUNCATED_INFORMATION } else { 1.0 };
-    let free = free.max(2.0 * 2.0);
-    free / (free - 2.0)
+    (free > 2.0).then(|| free / (free - 2.0))
 }

@@ -83,6 +83,9 @@ impl Flow<'_> {
             Self::Sphere { flow, .. } => flow.len(),
         };
         check_lengths(self.len(), flow)?;
+        if let Self::Plane { points, camera: None, .. } = self {
+            check_on_plane(points)?;
+        }
         if let Self::Sphere { bearings, .. } = self {
             let off = |b: &&[f64; 3]| (b[0].hypot(b[1]).hypot(b[2]) - 1.0).abs() > 1e-3;
             let wrong = bearings.iter().find(off);
@@ -108,6 +111,17 @@ impl Flow<'_> {
 /// An error that names an argument, if it is wrong.
 pub(crate) fn refuse_if(wrong: bool, name: &'static str, expected: impl Into<String>, got: impl Display) -> Result<()> {
     if wrong { Err(Error::argument(name, expected, got)) } else { Ok(()) }
+}
+
+/// Largest coordinate of a point on the plane at distance 1: 84 degrees off the axis.
+const MAX_ON_PLANE: f64 = 10.0;
+
+/// Refuses points in px without the camera matrix that would bring them to the plane at distance 1.
+pub(crate) fn check_on_plane(points: &[[f64; 2]]) -> Result<()> {
+    let far = points.iter().find(|point| point.iter().any(|x| x.is_finite() && x.abs() > MAX_ON_PLANE));
+    let expected = "the camera matrix for points in px; without it points lie on the plane at distance 1, within 10";
+    let got = format!("none, and the point {}", numbers(far.into_iter().flatten()));
+    refuse_if(far.is_some(), "K", expected, got)
 }
 
 pub(crate) fn check_lengths(points: usize, flow: usize) -> Result<()> {

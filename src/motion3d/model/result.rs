@@ -87,7 +87,8 @@ pub struct MotionEstimate {
     pub common: CommonEffect,
     /// The Cramér-Rao bound (8), with the information estimated; NaN where it is not known.
     pub bound: [[f64; 5]; 5],
-    /// Standard deviation of the direction, `sqrt(tr psi)`, degrees.
+    /// Standard deviation of the direction, `sqrt(tr psi)`, degrees; NaN where the covariance is not known,
+    /// as that of 7 points and fewer in unknown noise.
     pub direction_std: f64,
     /// Standard deviations of the rotation, rad/frame.
     pub rotation_std: [f64; 3],

@@ -15,7 +15,7 @@ use crate::motion3d::diagnostics::contact::Rates;
 use crate::motion3d::diagnostics::report::{likelihood, report_rotation, set_motion};
 use crate::motion3d::diagnostics::status::{SURE, WIDE, different};
 use crate::motion3d::model::input::{
-    Placement, affine_map, check_covariances, check_lengths, is_positive, refuse_if, to_plane,
+    Placement, affine_map, check_covariances, check_lengths, check_on_plane, is_positive, refuse_if, to_plane,
 };
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::UNKNOWNS;
@@ -60,6 +60,9 @@ const NONLINEAR: f64 = 4.0;
 impl AffinePatches<'_> {
     pub(crate) fn check(&self) -> Result<()> {
         check_lengths(self.points.len(), self.motion.len())?;
+        if self.camera.is_none() {
+            check_on_plane(self.points)?;
+        }
         check_covariances::<6>(self.points.len(), self.covariances, |_, given| is_positive(given))
     }
 

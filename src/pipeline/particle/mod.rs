@@ -117,13 +117,13 @@ impl ParticleRun {
         let mut tracker = ParticleTracker::new(&first, &[], &self.options)?;
         let targets = self.with_new(&mut tracker, Vec::new())?;
         self.sinks = begin()?;
-        self.deliver(&first, &tracker, &targets)?;
+        self.deliver(&first, frames.last_time(), &tracker, &targets)?;
         drop(first);
         while let Some(frame) = next(self.summary.frames)? {
             check_size(&mut size, frame.size(), self.numbering.index(self.summary.frames))?;
             let followed = tracker.update(&frame)?.targets.clone();
             let targets = self.with_new(&mut tracker, followed)?;
-            self.deliver(&frame, &tracker, &targets)?;
+            self.deliver(&frame, frames.last_time(), &tracker, &targets)?;
         }
         progress.step(self.summary.frames, total)?;
         if self.summary.frames < 2 {
@@ -152,9 +152,15 @@ impl ParticleRun {
         Ok(targets)
     }
 
-    fn deliver(&mut self, frame: &AnyColourFrame, tracker: &ParticleTracker, targets: &[ParticleTarget]) -> Result<()> {
+    fn deliver(
+        &mut self,
+        frame: &AnyColourFrame,
+        own_time: Option<f64>,
+        tracker: &ParticleTracker,
+        targets: &[ParticleTarget],
+    ) -> Result<()> {
         let frame_index = self.numbering.index(self.summary.frames);
-        let time = self.numbering.time(frame_index);
+        let time = self.numbering.time_of(frame_index, own_time);
         let step = ParticleFrame { frame_index, time, frame, targets, tracker };
         for sink in &mut self.sinks {
             sink.accept(&step)?;

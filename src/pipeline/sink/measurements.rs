@@ -19,14 +19,14 @@ pub struct MeasuredRegion {
     /// The region.
     pub region: Option<Region>,
     /// A pixel of the motion.
-    pub seed: Option<(f64, f64)>,
+    pub at: Option<(f64, f64)>,
 }
 
 /// Writes `frame, time_s, x, y, quantity, value, std, unit, share, valid_share, status`.
 ///
-/// A grid of sites is one region: [`fit_region`] gives its motion, `x`, `y` is its centre, `share` that of the
-/// sites with an estimate that follow the motion. A list of points has a row for each point. A quantity that cannot be
-/// had is NaN. Without a frame rate the time is empty and units are per frame.
+/// A grid of sites is one region: [`fit_region`] gives its motion, `x`, `y` is its centre, `share` that of
+/// the valid sites that follow the motion. A list of points has a row for each point. A quantity that cannot
+/// be had is NaN. Without a frame rate the time is empty and units are per frame.
 #[derive(Debug)]
 pub struct Measurements {
     table: Table,
@@ -96,7 +96,7 @@ impl<T: Real> Sink<Step<'_, T>> for Measurements {
                 })?;
             }
         } else {
-            let fit = fit_region(field, self.place.region.as_ref(), self.place.seed)?;
+            let fit = fit_region(field, self.place.region.as_ref(), self.place.at)?;
             let (share, valid_share) = (fit.share(), fit.valid_share());
             let place = Place { at: fit.centre, share, valid_share, status: RegionStatus::name(fit.status) };
             self.rows(step, &place, |quantity| measure(field, quantity, &fit))?;

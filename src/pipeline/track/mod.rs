@@ -137,7 +137,7 @@ impl TrackRun {
         let Begun { mut trackers, sinks } = begin(&self.prepared(&first, levels))?;
         self.sinks = sinks;
         let states: Vec<TrackState> = trackers.iter().map(|tracker| tracker.state().clone()).collect();
-        self.deliver(&first, &states)?;
+        self.deliver(&first, frames.last_time(), &states)?;
         drop(first);
         while let Some(frame) = next(self.summary.frames)? {
             check_size(&mut size, frame.size(), self.numbering.index(self.summary.frames))?;
@@ -146,7 +146,7 @@ impl TrackRun {
             let states = self.threads.install(|| {
                 trackers.par_iter_mut().map(|tracker| tracker.update(&grey)).collect::<Result<Vec<TrackState>>>()
             })?;
-            self.deliver(&frame, &states)?;
+            self.deliver(&frame, frames.last_time(), &states)?;
         }
         progress.step(self.summary.frames, total)?;
         if self.summary.frames < 2 { Err(too_few(self.summary.frames)) } else { Ok(()) }
@@ -159,9 +159,9 @@ impl TrackRun {
         GreyLevels::scaled(prepared, levels.gain(frame))
     }
 
-    fn deliver(&mut self, frame: &AnyFrame, states: &[TrackState]) -> Result<()> {
+    fn deliver(&mut self, frame: &AnyFrame, own_time: Option<f64>, states: &[TrackState]) -> Result<()> {
         let frame_index = self.numbering.index(self.summary.frames);
-        let time = self.numbering.time(frame_index);
+        let time = self.numbering.time_of(frame_index, own_time);
         let step = TrackStep { frame_index, time, frame, states };
         for sink in &mut self.sinks {
             sink.accept(&step)?;

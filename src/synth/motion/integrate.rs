@@ -1,6 +1,7 @@
 //! Particle paths of steady fields without a closed form.
 
 use super::PointMap;
+use crate::parallel::checkpoint;
 
 /// The map along the paths of the steady field `velocity` for `duration` frames: Runge-Kutta.
 pub(super) fn integrate<'a>(
@@ -12,6 +13,7 @@ pub(super) fn integrate<'a>(
     let h = if steps > 0.0 { duration / steps } else { 0.0 };
     Box::new(move |mut x, mut y| {
         for _ in 0..steps as usize {
+            checkpoint();
             let (a_u, a_v) = velocity(x, y);
             let (b_u, b_v) = velocity(x + 0.5 * h * a_u, y + 0.5 * h * a_v);
             let (c_u, c_v) = velocity(x + 0.5 * h * b_u, y + 0.5 * h * b_v);

@@ -35,6 +35,9 @@ pub struct Waves {
 }
 
 impl Waves {
+    /// Greatest speed, wavelengths a frame: each takes two hundred steps of the path integration.
+    pub const MAX_SPEED: f64 = 16.0;
+
     /// A field whose root-mean-square speed is `speed` px/frame and whose waves are `wavelength` px long.
     pub fn new(speed: f64, wavelength: f64, seed: u64) -> Self {
         let rng = CounterRng::new(seed);
@@ -55,7 +58,7 @@ impl Waves {
             }
         });
         let radians = TAU / wavelength * speed.abs();
-        Self { waves, steps_per_frame: (radians / RADIANS_PER_STEP).ceil().clamp(FEWEST_STEPS, 1e6) }
+        Self { waves, steps_per_frame: (radians / RADIANS_PER_STEP).ceil().max(FEWEST_STEPS) }
     }
 
     /// Velocity alone: what the path integration needs.

@@ -167,6 +167,11 @@ const WAVES: SceneKind = SceneKind {
     make: Make::Motion(|settings| {
         // Not the carrier's own stream of random numbers.
         let seed = settings.options.random_state.wrapping_add(0x3a7e);
-        Ok(Box::new(Waves::new(settings.value("speed"), settings.positive("wavelength")?, seed)))
+        let (speed, wavelength) = (settings.value("speed"), settings.positive("wavelength")?);
+        if speed.abs() > Waves::MAX_SPEED * wavelength {
+            let expected = format!("at most {} wavelengths a frame", Waves::MAX_SPEED);
+            return Err(Error::argument("speed", expected, format!("{speed} px/frame for waves of {wavelength} px")));
+        }
+        Ok(Box::new(Waves::new(speed, wavelength, seed)))
     }),
 };

@@ -10,7 +10,7 @@ use crate::filter::update_by_scalar;
 use nalgebra::{Matrix3, RowVector3, Vector3};
 
 /// What the measured velocity is taken for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Velocity {
     /// The mean since the frame before: `H = [0 1 -1/(2 alpha)]`, correct for (23).
     #[default]
@@ -29,7 +29,8 @@ pub struct Measurement {
 }
 
 /// The filter of both axes, which are independent.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(from = "Saved", into = "Saved")]
 pub struct GaussMarkovFilter {
     /// Correlation of the acceleration from frame to frame.
     pub alpha: f64,
@@ -43,8 +44,30 @@ pub struct GaussMarkovFilter {
     pub p: [Matrix3<f64>; 2],
 }
 
+/// The filter in plain numbers.
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Saved {
+    alpha: f64,
+    q: f64,
+    velocity: Velocity,
+    x: [[f64; 3]; 2],
+    p: [[[f64; 3]; 3]; 2],
+}
+
+impl From<Saved> for GaussMarkovFilter {
+    fn from(Saved { alpha, q, velocity, x, p }: Saved) -> Self {
+        Self { alpha, q, velocity, x: x.map(Into::into), p: p.map(Into::into) }
+    }
+}
+
+impl From<GaussMarkovFilter> for Saved {
+    fn from(GaussMarkovFilter { alpha, q, velocity, x, p }: GaussMarkovFilter) -> Self {
+        Self { alpha, q, velocity, x: x.map(Into::into), p: p.map(Into::into) }
+    }
+}
+
 /// Unscaled by the state: `alpha`, `q` and the variances of the start.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Dynamics {
     /// See [`GaussMarkovFilter::alpha`].
     pub alpha: f64,

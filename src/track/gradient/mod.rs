@@ -7,13 +7,15 @@
 //!
 //! A target starts with a box, or with what moves first (`start`, `detect`); then each frame passes the
 //! stages of `layered`, which filters the position by `gauss_markov`. `options` are what it is given; `shift`
-//! (pictures between their pixels) and `noise` (robust statistics of brightness) serve all.
+//! (pictures between their pixels) and `noise` (robust statistics of brightness) serve all; `persist` keeps
+//! the tracker.
 
 mod detect;
 mod gauss_markov;
 mod layered;
 mod noise;
 mod options;
+mod persist;
 #[cfg(feature = "reference")]
 pub mod reference;
 mod shift;
@@ -31,7 +33,7 @@ use layered::State;
 use reference::{LocalLoop, ReferenceOptions, SearchWindow};
 use start::Waiting;
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 enum Method {
     Layered(GradientOptions),
     #[cfg(feature = "reference")]
@@ -63,7 +65,7 @@ impl Method {
     }
 }
 
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 enum Engine {
     Waiting(Waiting),
     Layered(Box<State>),
@@ -72,7 +74,7 @@ enum Engine {
 }
 
 /// Follows one target.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct GradientTracker {
     state: TrackState,
     size: (usize, usize),
@@ -136,7 +138,8 @@ impl Tracker for GradientTracker {
                 let found = usable.and_then(|frame| Some((frame, waiting.find(frame, self.method.camera())?)));
                 if let Some((frame, bounds)) = found {
                     let (state, engine) = self.method.begin(frame, bounds);
-                    self.state = TrackState { frame: self.state.frame, reason: "the first object that moves", ..state };
+                    self.state =
+                        TrackState { frame: self.state.frame, reason: "the first object that moves".into(), ..state };
                     self.engine = engine;
                 }
             }

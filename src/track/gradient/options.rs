@@ -3,7 +3,7 @@
 use crate::types::TargetBox;
 
 /// Changes of the target's image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Shape {
     /// It rotates and grows: four unknowns. The default.
     #[default]
@@ -13,7 +13,7 @@ pub enum Shape {
 }
 
 /// What the camera does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum CameraMotion {
     /// It may move: the still scene is aligned from frame to frame where that explains the frames better.
     /// The default.
@@ -36,7 +36,7 @@ pub enum Start {
 }
 
 /// Options of the gradient tracker.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct GradientOptions {
     /// What the target may do; default similarity.
     pub shape: Shape,

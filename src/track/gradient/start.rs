@@ -15,7 +15,7 @@ const MIN_BOX_SIDE: f64 = 3.0;
 const MAX_BOX_PER_FRAME: f64 = 2.0;
 
 /// Nothing has moved yet: the last frame, and the point near which the target is.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Waiting {
     previous: Frame<f64>,
     near: Option<[f64; 2]>,
@@ -44,7 +44,7 @@ impl Waiting {
 pub(super) fn nothing_yet(at: [f64; 2]) -> TrackState {
     TrackState {
         status: TrackStatus::Lost,
-        reason: "nothing has moved yet",
+        reason: "nothing has moved yet".into(),
         visibility: 0.0,
         covariance: [[[f64::NAN; 3]; 3]; 2],
         ..TrackState::at(at, TargetBox::about(at, 0.0, 0.0))

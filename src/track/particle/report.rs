@@ -18,9 +18,6 @@ const HIDDEN: &str = "hidden: few of its tracks, colours unlike";
 const COVERED: &str = "another target covers half of it";
 const UNLIKE: &str = "colours unlike those it usually has";
 const NO_WEIGHT: &str = "no particle had a weight: the estimate is the prediction";
-/// All of them, in an order that files keep.
-pub(super) const REASONS: [&str; 10] =
-    ["", LEFT, LOST, NOTHING_SHOWN, CUT, HIDDEN_BY_TARGET, HIDDEN, COVERED, UNLIKE, NO_WEIGHT];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum StepCause {
@@ -138,7 +135,7 @@ fn state_of(
     TrackState {
         frame,
         status,
-        reason,
+        reason: reason.into(),
         reacquired: was_gone && status.is_measured(),
         velocity: [u + moved[0], v + moved[1]],
         acceleration: [unknown; 2],

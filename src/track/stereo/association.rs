@@ -40,7 +40,7 @@ impl Default for Recognition {
     }
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct ComponentTrack {
     pub id: u64,
     /// Begin, ordinary steps.
@@ -107,14 +107,14 @@ pub(super) struct Carried {
     pub coasting: bool,
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 struct LostTrack {
     track: ComponentTrack,
     /// Time of its position, ordinary steps.
     since: f64,
 }
 
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct TrackAssociation {
     pub live: Vec<Option<ComponentTrack>>,
     lost: Vec<LostTrack>,

@@ -10,7 +10,7 @@ pub(super) const LUMINANCE_LEVELS: usize = 64;
 const NONE: i32 = -1;
 
 /// Mean luminance of each cell in whole levels.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct CellLuminance {
     columns: i32,
     rows: i32,

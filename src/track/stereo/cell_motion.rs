@@ -6,7 +6,7 @@ use super::lucas_kanade::SmoothedLevels;
 use super::overlap::{Row, depth_motion};
 use rayon::prelude::*;
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct ObservedStep {
     pub clusters: Clusters,
     pub luminance: CellLuminance,

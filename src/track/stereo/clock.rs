@@ -8,7 +8,7 @@ pub(super) const GAP_RANGE: RangeInclusive<f64> = 1e-6..=1e6;
 pub(super) const STEP_TIME_RANGE: RangeInclusive<f64> = 1e-12..=1e12;
 
 /// Time of the current step.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Clock {
     /// Time since the first step, in ordinary steps.
     pub now: f64,

@@ -7,7 +7,7 @@ use crate::math::median;
 const NOBODY: u16 = u16::MAX;
 
 /// The clusters of a step; components without voxels are empty.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Clusters {
     pub voxels: Voxels,
     pub points: EdgePoints,

@@ -66,7 +66,7 @@ impl Arc {
 }
 
 /// Clusters of all steps and how they are connected.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct TrackGraph {
     nodes: BTreeMap<(usize, usize), Node>,
     /// Arcs by (time, from, to).

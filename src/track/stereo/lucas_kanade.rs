@@ -32,7 +32,7 @@ const FINE: usize = LEVEL_SIGMAS.len() - 1;
 /// Truncation of residuals in comparisons, grey levels.
 const MAX_RESIDUAL: f64 = 30.0;
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct SmoothedLevels([Frame<f32>; LEVEL_SIGMAS.len()]);
 
 impl SmoothedLevels {

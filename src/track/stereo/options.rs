@@ -27,7 +27,7 @@ pub(super) const MIN_COMPONENT_PIXELS: f64 = 20.0;
 pub const ARC_THRESHOLD: f64 = 0.4;
 
 /// Which system.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum StereoMode {
     /// Motion is measured by affine Lucas-Kanade and carries the mixture to the next step; hidden objects are
     /// recognised. The default.
@@ -41,7 +41,7 @@ pub enum StereoMode {
 choices!(StereoMode, "mode": Improved "improved", Paper "paper");
 
 /// The grid in which edge pixels are counted: cells over the picture, layers of disparity.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct VoxelGrid {
     /// Cells along x; default 80.
     pub columns: usize,
@@ -61,7 +61,7 @@ impl Default for VoxelGrid {
 }
 
 /// The cameras, for depths in metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StereoCamera {
     /// Focal length, px.
     pub focal: f64,
@@ -88,7 +88,7 @@ impl StereoCamera {
 
 /// Options of the stereo tracker. Begin with [`StereoTrackerOptions::new`]: some defaults differ between the
 /// modes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct StereoTrackerOptions {
     /// Which system.
     pub mode: StereoMode,

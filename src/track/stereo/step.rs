@@ -33,7 +33,7 @@ pub struct Step {
 }
 
 /// One track.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct Track {
     /// Steps at which it was seen, ascending.
     pub times: Vec<usize>,

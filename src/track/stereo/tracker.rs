@@ -27,7 +27,7 @@ use std::collections::BTreeMap;
 ///
 /// Deterministic: the same steps give the same result, bit for bit, on any number of threads. Only the graph
 /// grows with time.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct StereoTracker {
     options: StereoTrackerOptions,
     lattice: Option<Lattice>,

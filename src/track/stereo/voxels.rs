@@ -9,7 +9,7 @@ const EMPTY: u32 = u32::MAX;
 const MAX_REFINEMENT: f64 = 1.5;
 
 /// Edge pixels of the left view with their disparities: points `(x, y, d)`.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct EdgePoints {
     /// Columns x, px, N of them.
     pub columns: Vec<u32>,
@@ -65,7 +65,7 @@ impl EdgePoints {
 }
 
 /// The grid laid over frames of one size.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Lattice {
     pub grid: VoxelGrid,
     /// Size of the frames `(width, height)`, px.
@@ -161,7 +161,7 @@ impl Lattice {
 }
 
 /// The voxels that are not empty, with how many points are in each.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Voxels {
     pub lattice: Lattice,
     /// `(ix, iy, iz)` of each, in the order in which the points meet them.

@@ -8,6 +8,7 @@ use crate::options::{Integer, count, threads};
 use jacoflow::error::Error;
 use jacoflow::filter::check_mean;
 use jacoflow::filter::particle::ParticleFilter as Core;
+use pyo3::exceptions::PyOverflowError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Mutex;
@@ -102,6 +103,16 @@ pub(super) fn particles(value: &Bound<'_, PyAny>, expected: &[usize]) -> Outcome
     Ok(values)
 }
 
+/// An item of `ids`.
+fn id(value: &Bound<'_, PyAny>) -> Outcome<u64> {
+    value.extract().map_err(|error: PyErr| {
+        if error.is_instance_of::<PyOverflowError>(value.py()) {
+            return Error::argument("ids", "integers from 0 to 2^64 - 1", value).into();
+        }
+        error.into()
+    })
+}
+
 #[pymethods]
 impl ParticleFilter {
     #[new]
@@ -112,7 +123,7 @@ impl ParticleFilter {
         n_particles: Integer,
         batch: Option<Integer>,
         random_state: Option<Integer>,
-        ids: Option<Vec<u64>>,
+        ids: Option<Vec<Bound<'_, PyAny>>>,
         threads: Option<Integer>,
     ) -> Outcome<Self> {
         let batch = batch.map(|batch| count("batch", batch)).transpose()?;
@@ -125,7 +136,7 @@ impl ParticleFilter {
                 let got = format!("{} integers", ids.len());
                 return Err(Error::argument("ids", format!("{} integers", core.batch), got).into());
             }
-            core.targets = ids;
+            core.targets = ids.iter().map(id).collect::<Outcome<_>>()?;
         }
         let filter = Self { batch, dim_x, core: Mutex::new(core), x: Mutex::new(py.None()) };
         filter.take(py, &mut *lock(&filter.core)?)?;

@@ -13,6 +13,7 @@ use crate::flow::coarse_to_fine::pyramid::{ComparedFrames, PyramidLevel};
 use crate::flow::coarse_to_fine::regularize::{RegularizeScratch, Smoothness, regularize};
 use crate::flow::coarse_to_fine::resample::rederive;
 use crate::math::robust_std;
+use crate::parallel::checkpoint;
 use crate::simd::SimdReal;
 use std::ops::Range;
 
@@ -128,6 +129,7 @@ impl<T: SimdReal> Iteration<'_, T> {
 
     /// Linearises about `motion` and updates it. Returns the root-mean-square change of the flow, px.
     fn iterate(&mut self, level: &PyramidLevel<T>, smoothness: &Smoothness, motion: &mut Planes<T>) -> f64 {
+        checkpoint();
         let views = level.views(self.compared);
         let residuals = self.term.linearise(level.size, &views, motion, self.residual_std, self.data);
         self.residual_std = self.residual_std(residuals);

@@ -17,10 +17,12 @@ const SIGMA: f64 = 1.0;
 /// Shortest motion that is believed, px.
 const MIN_MOTION: f64 = 0.05;
 /// A frame and its reductions, made when they are first needed: the next frame needs them again.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct FramePyramid {
     pub frame: Frame<f64>,
+    #[serde(skip)]
     quarter: OnceCell<Frame<f64>>,
+    #[serde(skip)]
     half: OnceCell<Frame<f64>>,
 }
 

@@ -28,7 +28,7 @@ pub(super) const WHOLE_PIXEL_TOLERANCE: f64 = 2.0;
 /// Pixels that judge a displacement, about.
 const VOTES: f64 = 1024.0;
 
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct InitialSegmentation {
     pub bounds: TargetBox,
     pub target: Target,

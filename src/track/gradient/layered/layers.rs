@@ -27,7 +27,7 @@ const EDGE: f64 = 0.1;
 /// Weight of the first support, grey^2.
 pub(super) const PRIOR: f64 = 144.0;
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Target {
     /// Support, 0 to 1.
     pub a: Frame<f64>,
@@ -145,7 +145,7 @@ pub(super) fn is_inside([x, y]: [f64; 2], frame: &Frame<f64>) -> bool {
 }
 
 /// The picture behind the target, and where it is known.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Background {
     /// Brightness; where it was never seen, a guess.
     pub picture: Frame<f64>,

@@ -118,7 +118,7 @@ fn pass_over(tracker: &mut State, state: &mut TrackState, reason: &'static str) 
     tracker.motion.filter.predict();
     coast(tracker);
     report(tracker, state, None, [0.0; 2]);
-    (state.reason, state.reacquired) = (reason, false);
+    (state.reason, state.reacquired) = (reason.into(), false);
     let size = tracker.scene.previous.frame.size();
     hold_at_border(tracker, state, size);
 }

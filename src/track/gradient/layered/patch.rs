@@ -10,7 +10,7 @@ const TRUNCATE: f64 = 3.0;
 /// Least share of known pixels that a mean rests on.
 const MIN_KNOWN_SHARE: f64 = 1e-3;
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Patch {
     pub frame: Frame<f64>,
     /// Its first pixel in the picture.

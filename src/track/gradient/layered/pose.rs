@@ -1,7 +1,7 @@
 //! Where the target is: an affine map from its own coordinates into the picture.
 
 /// `W(xi) = p + A xi`, px.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Pose {
     pub p: [f64; 2],
     /// Row by row.

@@ -7,12 +7,13 @@ use crate::types::{TrackState, TrackStatus};
 const MAX_MISSED_FRAMES: usize = 15;
 
 pub(super) fn report(tracker: &State, state: &mut TrackState, found: Option<&Finding>, motion: [f64; 2]) {
-    (state.status, state.reason) = match found {
+    let (status, reason) = match found {
         Some(found) if found.occluded => (TrackStatus::Occluded, found.reason),
         Some(found) => (TrackStatus::Tracking, found.reason),
         None if tracker.history.missed >= MAX_MISSED_FRAMES => (TrackStatus::Lost, "not seen for long"),
         None => (TrackStatus::Coasting, "the target is not seen"),
     };
+    (state.status, state.reason) = (status, reason.into());
     state.camera_motion = motion;
     let measured = tracker.position(&tracker.motion.pose);
     let before = state.bounds.centre();
@@ -58,9 +59,10 @@ pub(super) fn hold_at_border(tracker: &mut State, state: &mut TrackState, (width
     }
     tracker.motion.pose = tracker.placed(tracker.motion.pose, tracker.motion.filter.position());
     report_motion(tracker, state);
-    (state.status, state.reason) = if tracker.history.missed >= MAX_MISSED_FRAMES {
+    let (status, reason) = if tracker.history.missed >= MAX_MISSED_FRAMES {
         (TrackStatus::Lost, "out of the picture for long")
     } else {
         (TrackStatus::Out, "out of the picture")
     };
+    (state.status, state.reason) = (status, reason.into());
 }

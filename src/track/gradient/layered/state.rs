@@ -26,7 +26,7 @@ pub(super) const MIN_SCALE_CHANGE: f64 = 0.04;
 /// Least noise, grey levels.
 pub(super) const MIN_NOISE: f64 = 1.5;
 
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(crate) struct State {
     pub motion_model: MotionModel,
     pub camera: CameraMotion,
@@ -44,7 +44,7 @@ pub(crate) struct State {
     pub last_good: Option<LastGood>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Motion {
     pub pose: Pose,
     pub filter: GaussMarkovFilter,
@@ -58,7 +58,7 @@ pub(super) struct Motion {
 }
 
 /// The frame before, and what the still scene did.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Scene {
     pub previous: FramePyramid,
     /// Standard deviation, grey levels.
@@ -71,7 +71,7 @@ pub(super) struct Scene {
     pub buffer: Vec<f64>,
 }
 
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct History {
     /// Frames measured.
     pub age: usize,
@@ -93,7 +93,7 @@ pub(super) struct History {
 }
 
 /// Standard deviations that the filter's covariance does not hold.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Uncertainty {
     /// Of the displacement since the first frame, until the first box is decided, px.
     pub displacement: [f64; 2],
@@ -103,7 +103,7 @@ pub(super) struct Uncertainty {
     pub noise_to_contrast: f64,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct LastGood {
     pub filter: GaussMarkovFilter,
     pub pose: Pose,

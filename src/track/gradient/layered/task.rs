@@ -8,7 +8,7 @@ pub(super) type Matrix = SMatrix<f64, 6, 6>;
 pub(super) type Vector = SVector<f64, 6>;
 
 /// What may change: the columns are unknowns, the rows the six entries of an increment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(super) enum MotionModel {
     /// Two unknowns.
     Translation,

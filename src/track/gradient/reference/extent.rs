@@ -46,7 +46,7 @@ fn quantile(counts: &[f64], share: f64) -> f64 {
 }
 
 /// How far apart the ends of the target usually are, px.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Extent {
     usual: [f64; 2],
 }

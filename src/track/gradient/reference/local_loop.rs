@@ -56,7 +56,7 @@ struct Measured {
     all_moves: bool,
 }
 
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(in crate::track::gradient) struct LocalLoop {
     rules: Rules,
     search_window: usize,
@@ -181,7 +181,7 @@ impl LocalLoop {
         }
         self.report(state, found, (innovation, measured, was_lost));
         if all_moves && state.status == TrackStatus::Coasting {
-            state.reason = ALL_MOVES;
+            state.reason = ALL_MOVES.into();
         }
     }
 
@@ -336,13 +336,14 @@ impl LocalLoop {
         found: Option<MeanFlow>,
         (innovation, measured, was_lost): (f64, bool, bool),
     ) {
-        (state.status, state.reason) = match (measured, found) {
+        let (status, reason) = match (measured, found) {
             (true, _) => (TrackStatus::Tracking, ""),
             _ if self.missed >= MAX_MISSED_FRAMES => (TrackStatus::Lost, "nothing that moves like the target for long"),
             (_, None) => (TrackStatus::Coasting, "the frame cannot be used"),
             (_, Some(mean)) if mean.count < MIN_MOVING_PIXELS => (TrackStatus::Coasting, "nothing moves"),
             _ => (TrackStatus::Coasting, "what moves is not where the target should be"),
         };
+        (state.status, state.reason) = (status, reason.into());
         state.reacquired = measured && was_lost;
         state.position = self.filter.position();
         state.velocity = self.filter.speed();

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::track::gradient::{gauss_markov::Dynamics, gauss_markov::Velocity, options::CameraMotion};
 
 /// How local flow is computed and what is accepted of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LocalFlowOptions {
     /// Side of the window of equations, px, odd.
     pub window: usize,
@@ -28,7 +28,7 @@ impl Default for LocalFlowOptions {
 }
 
 /// Which variant of the loop follows the target.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Method {
     /// With the repairs that it needs. The default.
     #[default]
@@ -38,7 +38,7 @@ pub enum Method {
 }
 
 /// How the window follows the filter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Control {
     /// In whole pixels.
     #[default]
@@ -48,7 +48,7 @@ pub enum Control {
 }
 
 /// Options of the paper's loop.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ReferenceOptions {
     /// Which variant.
     pub method: Method,
@@ -105,7 +105,7 @@ impl ReferenceOptions {
 }
 
 /// What is done, in all that the modes differ by.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Rules {
     pub flow: LocalFlowOptions,
     /// Gradient up to which a window is flat, grey levels/px. Without a minimum of the gradients it is what

@@ -1,0 +1,212 @@
+"""Arrays in files of several kinds, as sequences of frames: .npz, HDF5, MATLAB, and TIFF through tifffile."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import weakref
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._jacoflow import FormatError, MissingDependencyError, luminance
+from ._request import Request
+
+Frame = NDArray[Any]
+
+
+class Stack:
+    """Frames 0 to `count` of `get`, those of the request, by its rule for colour."""
+
+    frame_rate: float | None = None
+    time: float | None = None
+    pixel_pitch: tuple[float, float] | None = None
+    length_unit: str | None = None
+
+    def __init__(self, request: Request, count: int, get: Callable[[int], Frame]) -> None:
+        """`get(index)`: a frame (H, W), or (H, W, C) with C = 1, 3 or 4."""
+        self._request, self._get = request, get
+        self._indices = list(range(count)[request.start : request.stop : request.step])[::-1]
+
+    def __length_hint__(self) -> int:
+        return len(self._indices)
+
+    def __next__(self) -> Frame:
+        if not self._indices:
+            raise StopIteration
+        return _presented(self._get(self._indices.pop()), self._request)
+
+
+def _presented(frame: Frame, request: Request) -> Frame:
+    """A frame by the rule for colour."""
+    if frame.ndim == 3 and frame.shape[2] == 1:
+        frame = frame[..., 0]
+    if request.colour == "rgb":
+        if frame.ndim == 3:
+            return np.ascontiguousarray(frame[..., :3])
+        if request.grey != "repeat":
+            raise FormatError(f"{request.source}: holds grey; colour is needed (red, green and blue)")
+        return np.repeat(frame[..., None], 3, axis=2)
+    if frame.ndim == 2:
+        return np.ascontiguousarray(frame)
+    if request.colour != "luminance":
+        raise FormatError(f'{request.source}: holds colour; expected grey. Ask for luminance by colour="luminance"')
+    return luminance(np.ascontiguousarray(frame[..., :3]))
+
+
+def _stack(request: Request, shape: tuple[int, ...], get: Callable[[int], Frame], whole: Callable[[], Frame]) -> Stack:
+    """A stack (T, H, W) or (T, H, W, C), or one frame (H, W), in colour (H, W, 3 or 4)."""
+    match shape:
+        case (_, _):
+            return Stack(request, 1, lambda _: whole())
+        case (_, _, 3 | 4) if request.colour == "rgb":
+            return Stack(request, 1, lambda _: whole())
+        case (count, _, _) | (count, _, _, 1 | 3 | 4):
+            return Stack(request, count, get)
+    raise FormatError(f"{request.source}: expected a stack (T, H, W), a frame (H, W) or colour (T, H, W, 3), got shape {shape}")
+
+
+def _chosen(request: Request, shapes: Mapping[str, tuple[int, ...]]) -> str:
+    """The array named by the request, else the only one with the axes of frames."""
+    if request.key is not None:
+        if request.key in shapes:
+            return request.key
+        raise ValueError(f"key: expected one of {sorted(shapes)}, got {request.key!r}")
+    candidates = [name for name, shape in shapes.items() if 2 <= len(shape) <= 4 and math.prod(shape) > 1]
+    if len(candidates) == 1:
+        return candidates[0]
+    listed = ", ".join(f"{name} {shapes[name]}" for name in sorted(shapes)) or "none"
+    raise FormatError(f"{request.source}: expected one array of frames, or its name as key=; the file holds {listed}")
+
+
+def _package(request: Request, name: str, what: str) -> Any:
+    """An optional package, or an error that says how to get it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        package = name.split(".")[0]
+        raise MissingDependencyError(f"{request.source}: reading {what} needs {package}: pip install {package}") from error
+
+
+def open_npz(request: Request) -> Stack:
+    """The stack (T, H, W) in a .npz archive."""
+    try:
+        with np.load(request.source, allow_pickle=False) as archive:
+            if not hasattr(archive, "files"):
+                raise FormatError(f"{request.source}: no .npz archive")
+            arrays = {name: archive[name] for name in archive.files if request.key in (None, name)}
+            shapes = {name: np.shape(array) for name, array in arrays.items() if array.dtype.kind in "biuf"}
+            if request.key is not None and request.key not in shapes:
+                shapes = dict.fromkeys(archive.files, ())
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError, EOFError, KeyError) as error:
+        raise FormatError(f"{request.source}: no .npz archive of plain arrays ({error})") from error
+    array = arrays[_chosen(request, shapes)]
+    return _stack(request, array.shape, array.__getitem__, lambda: array)
+
+
+def open_hdf5(request: Request) -> Stack:
+    """The data set (T, H, W) in an HDF5 file."""
+    sets = _hdf5_sets(request)
+    data = sets[_chosen(request, {name: each.shape for name, each in sets.items()})]
+    return _stack(request, data.shape, data.__getitem__, lambda: np.asarray(data))
+
+
+def open_matlab(request: Request) -> Stack:
+    """The array (H, W, T), rows x columns x time, in a MATLAB file; colour (H, W, 3, T)."""
+    with open(request.source, "rb") as file:
+        head = file.read(128)
+    # HDF5 behind a block of its own, whose text says so.
+    if b"MATLAB 7.3" in head:
+        sets = _hdf5_sets(request)
+        # Axes are in the reverse order there.
+        data = sets[_chosen(request, {name: each.shape for name, each in sets.items()})]
+        shape = data.shape[::-1]
+        get: Callable[[int], Frame] = lambda k: np.asarray(data[k]).T
+        whole: Callable[[], Frame] = lambda: np.asarray(data).T
+    else:
+        array = _old_matlab(request)
+        shape = array.shape
+        get, whole = (lambda k: array[..., k]), (lambda: array)
+    if len(shape) == 2 or (request.colour == "rgb" and len(shape) == 3 and shape[2] in (3, 4)):
+        return Stack(request, 1, lambda _: whole())
+    return _stack(request, (shape[-1], *shape[:-1]), get, whole)
+
+
+def _old_matlab(request: Request) -> Frame:
+    matlab = _package(request, "scipy.io", "MATLAB files before 7.3")
+    kinds = {"double", "single", "logical", *(f"{sign}int{bits}" for sign in ("u", "") for bits in (8, 16, 32, 64))}
+    try:
+        shapes = {name: shape for name, shape, kind in matlab.whosmat(request.source) if kind in kinds}
+    except (ValueError, TypeError, NotImplementedError, matlab.matlab.MatReadError) as error:
+        raise FormatError(f"{request.source}: no MATLAB file that can be read ({error})") from error
+    name = _chosen(request, shapes)
+    array: Frame = matlab.loadmat(request.source, variable_names=[name])[name]
+    return array
+
+
+def _hdf5_sets(request: Request) -> dict[str, Any]:
+    """The data sets of numbers in a file by name; they keep it open."""
+    h5py = _package(request, "h5py", "HDF5 (also MATLAB 7.3)")
+    try:
+        file = h5py.File(request.source, "r")
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise FormatError(f"{request.source}: no HDF5 file that can be read ({error})") from error
+    sets: dict[str, Any] = {}
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and item.dtype.kind in "biuf":
+            sets[name] = item
+
+    file.visititems(visit)
+    return sets
+
+
+def open_tifffile(request: Request) -> Stack | None:
+    """A TIFF through tifffile, for kinds that the built-in reader does not know; None where tifffile is not
+    installed. Its series must be along time, the channel and slice of the request aside."""
+    try:
+        tifffile: Any = importlib.import_module("tifffile")
+    except ImportError:
+        return None
+    file = tifffile.TiffFile(request.source)
+    try:
+        stack = Stack(request, *_series_frames(request, file.series[0]))
+    except BaseException:
+        file.close()
+        raise
+    weakref.finalize(stack, file.close)
+    return stack
+
+
+def _series_frames(request: Request, series: Any) -> tuple[int, Callable[[int], Frame]]:
+    """Number of frames of a series of tifffile, of the channel and slice of the request, and the frames."""
+    own = len(series.keyframe.shape)
+    outer = list(zip(series.axes[:-own], series.shape[:-own], strict=True))
+    places: NDArray[Any] = np.arange(len(series.pages)).reshape([length for _, length in outer])
+    for axis, option, index in (("C", "channel", request.channel), ("Z", "z", request.z)):
+        where = [k for k, (letter, _) in enumerate(outer) if letter == axis]
+        if not where or index == "time":
+            continue
+        length = outer[where[0]][1]
+        if index is None and length > 1:
+            raise FormatError(f"{request.source}: holds {length} planes along {axis}; choose one with {option}=0 to {option}={length - 1}")
+        if index is not None and int(index) >= length:
+            raise ValueError(f"{option}: expected an index below {length}, got {index}")
+        places = np.take(places, [int(index or 0)], axis=where[0])
+        outer[where[0]] = (axis, 1)
+    if sum(length > 1 for _, length in outer) > 1:
+        raise FormatError(f"{request.source}: holds planes along the axes {''.join(letter for letter, _ in outer)}; expected time alone")
+    pages = places.ravel()
+    is_planar = series.axes[-own:].startswith("S")
+
+    def get(k: int) -> Frame:
+        image: Frame = series.pages[int(pages[k])].asarray()
+        return np.moveaxis(image, 0, -1) if is_planar else image
+
+    return len(pages), get

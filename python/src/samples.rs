@@ -1,0 +1,67 @@
+//! Arrays of any sample type as arrays of the types that the core has, where these hold the samples exactly.
+
+use crate::errors::Outcome;
+use jacoflow::types::LARGEST_EXACT_INTEGER;
+use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyString;
+
+/// Whether the object is a numpy array with a mask of its own.
+pub fn is_masked(object: &Bound<'_, PyAny>) -> Outcome<bool> {
+    Ok(object.is_instance_of::<PyUntypedArray>() && object.hasattr("mask")?)
+}
+
+/// A grey or colour frame's samples in a type of the core's, where that holds them exactly: bool as uint8,
+/// int8, int16 and float16 as float32, wider integers as float64. Masked samples become NaN, those of masked
+/// uint8 and uint16 arrays in float32. Arrays of other types stay as they are.
+/// ValueError for an integer beyond 2^53.
+pub fn exact_samples<'py>(argument: &str, array: Bound<'py, PyUntypedArray>) -> Outcome<Bound<'py, PyUntypedArray>> {
+    let masked = is_masked(&array)?;
+    let (kind, size) = (array.dtype().kind(), array.dtype().itemsize());
+    let wanted = match (kind, size) {
+        (b'b', _) if !masked => "uint8",
+        (b'i', 1 | 2) | (b'f', 2) => "float32",
+        (b'i' | b'u', 4 | 8) => "float64",
+        (b'b' | b'u', 1 | 2) | (b'f', 4) if masked => "float32",
+        (b'f', 8) if masked => "float64",
+        _ => return Ok(array),
+    };
+    if matches!(kind, b'i' | b'u') && size == 8 {
+        expect_exact(argument, &array, masked)?;
+    }
+    let converted = array.call_method1("astype", (wanted,))?;
+    let converted = if masked { converted.call_method1("filled", (f64::NAN,))? } else { converted };
+    Ok(converted.cast_into::<PyUntypedArray>()?)
+}
+
+/// Refuses integers that float64 does not hold.
+fn expect_exact(argument: &str, array: &Bound<'_, PyUntypedArray>, masked: bool) -> Outcome<()> {
+    let numbers = if masked { array.call_method0("compressed")? } else { array.clone().into_any() };
+    if numbers.len()? == 0 || array.shape().contains(&0) {
+        return Ok(());
+    }
+    for extreme in ["min", "max"] {
+        let value: i128 = numbers.call_method0(extreme)?.extract()?;
+        if value.unsigned_abs() > u128::from(LARGEST_EXACT_INTEGER) {
+            return Err(PyValueError::new_err(format!(
+                "{argument}: expected integers of at most 2^53, which float64 holds exactly, got {value} ({})",
+                array.dtype()
+            ))
+            .into());
+        }
+    }
+    Ok(())
+}
+
+/// Refuses the name of a file where its frames are expected.
+pub fn refuse_path(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<()> {
+    if object.is_instance_of::<PyString>() || object.hasattr("__fspath__")? {
+        return Err(PyTypeError::new_err(format!(
+            "{argument}: expected an array, got the name of a file ({}); open it with jacoflow.io.frames(path)",
+            object.str()?
+        ))
+        .into());
+    }
+    Ok(())
+}

@@ -1,0 +1,23 @@
+//! The tracker as bytes, from which it goes on bit for bit: reductions of the last frame are made again.
+
+use super::GradientTracker;
+use crate::error::Result;
+use crate::track::persist::Kind;
+
+const TRACKER: Kind = Kind { mark: *b"JFGT", layout: 1, what: "gradient tracker" };
+
+impl GradientTracker {
+    /// Everything, as bytes: what they give back goes on as this one would, bit for bit.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        TRACKER.sealed(self)
+    }
+
+    /// A tracker from the bytes that [`GradientTracker::to_bytes`] gave.
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::Error::Argument) named `state` for bytes of another kind or layout, and for
+    /// damaged ones.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        TRACKER.opened(bytes)
+    }
+}

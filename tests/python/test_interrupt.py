@@ -1,0 +1,103 @@
+"""Ctrl-C stops long work in its middle, and what was half changed is not used."""
+
+import os
+import subprocess
+import sys
+import textwrap
+
+import pytest
+
+BEGIN = """
+import os, signal, sys, threading
+import numpy as np
+import jacoflow
+from jacoflow import io, mixture, motion3d, stereo, track
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+texture = np.random.default_rng(0).integers(0, 256, (1300, 1700)).astype(np.uint8)
+
+def stopped(call):
+    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    try:
+        call()
+    except KeyboardInterrupt:
+        return True
+    return False
+"""
+
+
+def run(script):
+    """Runs it as a program of its own: signals are for the main thread of a process."""
+    whole = BEGIN + textwrap.dedent(script)
+    ended = subprocess.run([sys.executable, "-c", whole], capture_output=True, text=True, timeout=240, check=False)
+    assert ended.returncode == 0, ended.stderr
+
+
+ENDLESS = {
+    "mixture": "mixture.VariationalGaussianMixture(8, max_iter=10**9, tol=None).fit(points)",
+    "starts of a mixture": "mixture.VariationalGaussianMixture(4, max_iter=2, n_init=10**9).fit(points)",
+    "Dirichlet mixture": "mixture.DirichletProcessGaussianMixture(8, max_iter=10**9, tol=None).fit(points)",
+    "frames of a scene": "jacoflow.scenes.Scene('turbulence', width=64, height=64).frame(1e6)",
+}
+
+
+@pytest.mark.parametrize("name", ENDLESS)
+def test_work_without_end_stops(name):
+    run(f"""
+        points = np.random.default_rng(0).normal(size=(4000, 3))
+        assert stopped(lambda: {ENDLESS[name]})
+        assert mixture.VariationalGaussianMixture(2, max_iter=3, random_state=0).fit(points).means_.shape == (2, 3)
+    """)
+
+
+def test_a_tracker_that_was_stopped_in_a_step_says_so():
+    run("""
+        tracker = track.StereoTracker(n_components=48)
+        assert stopped(lambda: [tracker.update(texture, np.roll(texture, k, 1)) for k in range(1000)])
+        for use in (lambda: tracker.row_offset, lambda: tracker.graph, lambda: tracker.update(texture, texture)):
+            try:
+                use()
+            except ValueError as error:
+                assert str(error).startswith("self: expected a tracker whose last step was completed")
+            else:
+                raise AssertionError("it goes on")
+    """)
+
+
+def test_an_estimate_stops_and_its_estimator_begins_anew():
+    run("""
+        estimator = jacoflow.FlowEstimator(method=jacoflow.CoarseToFine(preset="accurate"))
+        estimator.push(texture)
+        estimator.push(np.roll(texture, 1, 1))
+        assert stopped(lambda: estimator.push(np.roll(texture, 2, 1)))
+        assert estimator.frames_pushed == 0
+        small = [texture[:40, k : k + 50] for k in range(3)]
+        for frame in small:
+            field = estimator.push(frame)
+        np.testing.assert_array_equal(field.flow, jacoflow.flow(*small, method=jacoflow.CoarseToFine(preset="accurate")).flow)
+        assert stopped(lambda: jacoflow.estimate([texture, np.roll(texture, 1, 1), np.roll(texture, 2, 1)]))
+    """)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
+@pytest.mark.parametrize("call", ["io.frames(pipe)", "jacoflow.FlowField.load(pipe)", "io.read_image(pipe)", "io.read_disparity(pipe)"])
+def test_a_pipe_that_nobody_writes_to_is_left(call, tmp_path):
+    pipe = tmp_path / ("pipe.y4m" if "frames" in call else "pipe.pfm")
+    os.mkfifo(pipe)
+    run(f"""
+        pipe = {str(pipe)!r}
+        assert stopped(lambda: {call})
+    """)
+
+
+def test_threads_other_than_the_main_one_compute_as_ever():
+    run("""
+        found = []
+        small = [texture[:40, k : k + 50] for k in range(3)]
+        threads = [threading.Thread(target=lambda: found.append(jacoflow.estimate(small).flow)) for _ in range(3)]
+        [thread.start() for thread in threads]
+        [thread.join() for thread in threads]
+        for flow in found:
+            np.testing.assert_array_equal(flow, jacoflow.estimate(small).flow)
+        assert len(found) == 3
+    """)

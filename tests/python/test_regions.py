@@ -1,0 +1,191 @@
+"""Quantities of regions: one motion, means, and rates that are those of the motion and not of its chord."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import jacoflow
+from benchmarks.scenes.steps import CENTRE, SIZE, moved, texture, turn
+
+DISC = (*CENTRE, 45.0)
+PICTURE = texture(0)
+
+
+def turned(picture, angle):
+    return moved(picture, turn(angle))
+
+
+@pytest.mark.parametrize("degrees", [5.0, 10.0, 15.0])
+def test_a_turn_has_its_own_rate(degrees):
+    angle = np.radians(degrees)
+    field = jacoflow.flow(*(turned(PICTURE, k * angle) for k in (-1, 0, 1)))
+    assert_allclose(field.measure("angular_velocity", DISC).value, angle, rtol=1e-3)
+    assert_allclose(field.region_mean("curl", DISC)[0], 2 * angle, rtol=1e-3)
+
+
+def test_an_expansion_has_its_own_rate():
+    pair = (moved(PICTURE, np.eye(2)), moved(PICTURE, 1.2 * np.eye(2)))
+    assert_allclose(jacoflow.flow(*pair).measure("divergence", DISC).value, 2 * np.log(1.2), rtol=1e-3)
+
+
+@pytest.mark.parametrize("frames", [59.0, 9.0, 4.0])
+def test_the_time_to_contact_counts_from_the_frame_of_the_field(frames):
+    views = [moved(PICTURE, np.eye(2) * frames / (frames - k)) for k in (-1, 0, 1)]
+    for field in (jacoflow.flow(*views[1:]), jacoflow.flow(*views)):
+        found = field.measure("time_to_contact", DISC)
+        assert abs(found.value - frames) < max(4 * found.std, 1e-3 * frames) and found.std < 0.1 * frames
+        mean, std, _ = field.region_mean("time_to_contact", DISC)
+        assert abs(mean - frames) < max(4 * std, 1e-3 * frames)
+
+
+def test_ratios_are_formed_of_means():
+    rng = np.random.default_rng(3)
+    views = [moved(PICTURE, np.eye(2) * 30 / (30 - k)) for k in range(2)]
+    field = jacoflow.flow(*(np.clip(np.rint(view + rng.normal(0, 12, view.shape)), 0, 255).astype(np.uint8) for view in views))
+    found = field.measure("time_to_contact", DISC)
+    for value, std in (field.region_mean("time_to_contact", DISC)[:2], (found.value, found.std)):
+        assert abs(value - 30) < 3 * std and std < 15, (value, std)
+
+
+def test_noise_adds_nothing_to_a_length():
+    rng = np.random.default_rng(4)
+    still = turned(PICTURE, 0.0)
+    frames = [np.clip(np.rint(still + rng.normal(0, 15, still.shape)), 0, 255).astype(np.uint8) for _ in range(2)]
+    field = jacoflow.flow(*frames)
+    speeds = np.asarray(field.speed)[field.valid]
+    value, std, _ = field.region_mean("speed", DISC)
+    assert value < 3 * std and value < 0.3 * speeds.mean(), (value, std, speeds.mean())
+
+
+RPM, FPS, RADIUS = 300.0, 250.0, 40.0
+
+
+def fan():
+    """Eight-bit frames of a textured disc of 300 rpm before a textured wall."""
+    step, wall = RPM * 2 * np.pi / 60 / FPS, turned(texture(5), 0.0)
+    y, x = np.mgrid[:SIZE, :SIZE]
+    inside = np.hypot(x - CENTRE[0], y - CENTRE[1]) < RADIUS
+    rng = np.random.default_rng(6)
+    for k in range(3):
+        frame = np.where(inside, turned(PICTURE, k * step), wall) + rng.normal(0, 1, wall.shape)
+        yield np.clip(np.rint(frame), 0, 255).astype(np.uint8)
+
+
+@pytest.fixture(scope="module")
+def fan_field():
+    return jacoflow.flow(*fan(), fps=FPS)
+
+
+@pytest.mark.parametrize(
+    ("region", "at"),
+    [
+        ((40, 40, 81, 81), None),  # A box round the fan, a fifth of it wall.
+        ((60, 60, 40, 40), None),
+        ((*CENTRE, 20.0), None),
+        ([(50, 50), (110, 50), (110, 110), (50, 110)], None),
+        (None, CENTRE),  # The whole frame, a tenth of it fan.
+    ],
+)
+def test_a_fan_before_a_wall_has_its_speed(fan_field, region, at):
+    found = fan_field.measure("rpm", region, at=at)
+    assert found.status == "ok" and found.unit == "rpm"
+    assert_allclose(found.value, RPM, rtol=0.01)
+    assert abs(found.value - RPM) < 4 * found.std
+    centre = [fan_field.measure(f"rotation_centre_{axis}", region, at=at).value for axis in "xy"]
+    assert_allclose(centre, CENTRE, atol=0.3)
+
+
+def test_the_rest_of_the_frame_stands_still(fan_field):
+    for at in (None, (5, 5)):
+        found = fan_field.measure("rpm", at=at)
+        assert found.status == "ok" and abs(found.value) < 1 and found.share > 0.6
+
+
+def test_without_a_dominant_motion_there_is_no_value():
+    flow = np.zeros((30, 60, 2))
+    flow[:, 20:40, 0], flow[:, 40:, 1] = 5.0, 5.0
+    field = jacoflow.FlowField.from_arrays(flow, np.broadcast_to(1e-4 * np.eye(2), (30, 60, 2, 2)))
+    found = field.measure("u")
+    assert found.status == "no_dominant_motion" and np.isnan(found.value) and np.isnan(found.std)
+    assert_allclose(found.share, 1 / 3)
+    assert_allclose([field.measure("u", at=(x, 15)).value for x in (10, 30, 50)], [0, 5, 0], atol=1e-6)
+
+
+def test_where_the_frames_contradict_most_estimates_nothing_is_said():
+    # 64 px are beyond what is searched for in a frame of this size.
+    wide = np.kron(np.random.default_rng(0).integers(0, 255, (50, 100)), np.ones((2, 2))).astype(np.uint8)
+    field = jacoflow.flow(wide[:, 64:], wide[:, :-64])
+    assert field.valid.mean() < 0.5 and (np.abs(field.u - 64) > 10).all()
+    assert np.isnan(field.region_mean("u")[0]) and field.measure("u").status == "too_few_sites"
+
+
+def test_regions_of_every_kind_agree(fan_field):
+    y, x = np.mgrid[:SIZE, :SIZE]
+    mask = (x >= 60) & (x < 100) & (y >= 60) & (y < 100)
+    corners = np.array([(59.5, 59.5), (99.5, 59.5), (99.5, 99.5), (59.5, 99.5)])
+    for name in ("rpm", "u", "speed"):
+        rectangle = fan_field.region_mean(name, (60, 60, 40, 40))
+        assert fan_field.region_mean(name, mask) == rectangle
+        assert fan_field.region_mean(name, corners) == rectangle
+        assert fan_field.measure(name, mask).value == fan_field.measure(name, corners).value
+
+
+@pytest.mark.parametrize(
+    ("region", "words"),
+    [
+        ("all", "a string"),
+        ((1, 2), "shape (2,)"),
+        ((0, 0, 10.5, 10), "whole px"),
+        ((-1, 0, 10, 10), "none negative"),
+        ((150, 0, 20, 10), "rectangle inside"),
+        ((10, 10, -3), "positive radius"),
+        ([(0, 0), (5, 5)], "3 corners"),
+        (np.ones((3, 4), bool), "(160, 160)"),
+        (np.zeros((2, 2, 2)), "shape (2, 2, 2)"),
+    ],
+)
+def test_wrong_regions_are_named(fan_field, region, words):
+    for call in (fan_field.region_mean, fan_field.measure):
+        with pytest.raises(ValueError, match="^region: ") as error:
+            call("curl", region)
+        assert words in str(error.value)
+
+
+def test_a_stack_is_measured_at_every_time():
+    frames = np.stack(list(fan()))
+    found = jacoflow.estimate(frames, fps=FPS).measure("rpm", DISC[:2] + (25.0,))
+    assert found.value.shape == (3,) and found.status[:2] == ["ok", "ok"]
+    assert_allclose(found.value[:2], RPM, rtol=0.01)
+    assert found.status[2] == "too_few_sites" and np.isnan(found.value[2])
+    assert found.motion.shape == (3, 6) and found.covariance.shape == (3, 6, 6) and found.centre.shape == (3, 2)
+    assert "3 fields, 2 ok" in repr(found)
+
+
+def test_pixels_outside_the_frame_are_named(fan_field):
+    with pytest.raises(ValueError, match="^at: expected a pixel"):
+        fan_field.measure("rpm", at=(-1, 3))
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"), [("vorticity", "curl"), ("div", "divergence"), ("ttc", "time_to_contact"), ("Speeed", "speed"), ("curll", "curl"), ("rotation_center_x", "rotation_centre_x")]
+)
+def test_names_of_other_conventions_are_understood(fan_field, name, meant):
+    for call in (fan_field.std, fan_field.value, fan_field.unit, fan_field.region_mean, fan_field.measure):
+        with pytest.raises(ValueError, match=f'did you mean "{meant}"'):
+            call(name)
+
+
+@pytest.mark.parametrize("region", [(20, 20, 60, 40), (60, 45, 80, 70)])
+def test_a_mean_stands_at_the_centre_of_its_region(region):
+    # Variances differ over the picture: the weighted mean of the places is not their centre.
+    scene = jacoflow.scenes.Scene("affine", width=200, height=160, u=0.0, v=0.0, u_x=0.0, v_y=0.0, v_x=0.03, u_y=-0.03, random_state=1)
+    field, truth = jacoflow.flow(*scene.frames(2)), scene.truth(0.0, between=(0.0, 1.0))
+    x, y, width, height = region
+    inside = (slice(y, y + height), slice(x, x + width))
+    for name in "uv":
+        value, std, _ = field.region_mean(name, region)
+        assert abs(value - getattr(truth, name)[inside].mean()) < 3 * std + 1e-3 and std < 0.05
+    middle = truth.flow[inside].mean(axis=(0, 1))
+    assert_allclose(field.region_mean("speed", region)[0], np.hypot(*middle), atol=5e-3)
+    distance = np.linalg.norm(np.linalg.solve(truth.jacobian[y, x], middle))
+    assert_allclose(field.region_mean("centre_distance", region)[0], distance, atol=0.3)

@@ -1,0 +1,93 @@
+"""Frames of any sample type are converted where that is exact, and refused where it is not."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+import jacoflow
+
+METHOD = "windowed"
+
+
+def same(left, right):
+    assert_array_equal(left.flow, right.flow)
+    assert_array_equal(left.covariance, right.covariance)
+    assert_array_equal(left.status, right.status)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "core"),
+    [
+        ("int8", np.float32),
+        ("int16", np.float32),
+        (">i2", np.float32),
+        ("float16", np.float32),
+        ("int32", np.float64),
+        ("uint32", np.float64),
+        ("int64", np.float64),
+        ("uint64", np.float64),
+    ],
+)
+def test_other_types_are_converted_exactly(texture, dtype, core):
+    frames = texture // 2
+    same(jacoflow.estimate(frames.astype(dtype), method=METHOD), jacoflow.estimate(frames.astype(core), method=METHOD))
+    streamed = jacoflow.FlowEstimator(method=METHOD)
+    plain = jacoflow.FlowEstimator(method=METHOD)
+    for frame in frames:
+        given, want = streamed.push(frame.astype(dtype)), plain.push(frame.astype(core))
+    same(given, want)
+    colour = np.stack(frames, axis=-1)
+    assert_array_equal(jacoflow.luminance(colour.astype(dtype)), jacoflow.luminance(colour.astype(core)))
+
+
+def test_negative_samples_keep_their_sign(texture):
+    signed = texture.astype(np.int16) - 300
+    same(jacoflow.estimate(signed, method=METHOD), jacoflow.estimate(signed.astype(np.float32), method=METHOD))
+
+
+def test_bool_frames_are_black_and_white(texture):
+    frames = texture > 128
+    same(jacoflow.estimate(frames, method=METHOD), jacoflow.estimate(frames.astype(np.uint8), method=METHOD))
+
+
+@pytest.mark.parametrize("dtype", [np.int64, np.uint64])
+def test_integers_that_float64_does_not_hold_are_refused(texture, dtype):
+    frames = texture.astype(dtype)
+    frames[1, 3, 4] = 2**53
+    assert jacoflow.flow(*frames, method=METHOD).shape == frames[0].shape
+    frames[1, 3, 4] = 2**53 + 1
+    with pytest.raises(ValueError, match=r"frames: expected integers of at most 2\^53.*got 9007199254740993"):
+        jacoflow.estimate(list(frames), method=METHOD)
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "int16", "int32", "float32", "float64"])
+def test_masked_pixels_are_not_used(texture, dtype):
+    frames = texture.astype(dtype)
+    hidden = np.zeros(frames.shape, bool)
+    hidden[:, 10:14, 20:25] = True
+    spoilt = np.where(hidden, 99, frames).astype(dtype)
+    masked = np.ma.array(spoilt, mask=hidden)
+    want = spoilt.astype(np.float64 if dtype in ("int32", "float64") else np.float32)
+    want[hidden] = np.nan
+    for given in (masked, list(masked)):
+        got, plain = (jacoflow.flow(*stack, method=METHOD) for stack in (given, want))
+        same(got, plain)
+    assert not got.valid[11, 22] and got.valid[30, 30]
+    same(jacoflow.estimate(masked, method=METHOD)[1], plain)
+    streamed = jacoflow.FlowEstimator(method=METHOD)
+    same([streamed.push(frame) for frame in masked][-1], plain)
+    assert_array_equal(masked.data, spoilt)
+
+
+def test_a_masked_array_without_masked_pixels_is_used_whole(texture):
+    same(jacoflow.estimate(np.ma.array(texture), method=METHOD), jacoflow.estimate(texture.astype(np.float32), method=METHOD))
+
+
+@pytest.mark.parametrize("take", [jacoflow.segment.felzenszwalb, lambda frame: jacoflow.track.GradientTracker(frame, (10, 10, 13, 13))])
+def test_others_take_other_types_too(take):
+    frame = np.random.default_rng(0).integers(0, 255, (64, 64))
+    take(frame)
+    with pytest.raises(ValueError, match=r"2\^53"):
+        take(frame + 2**60)
+    with pytest.raises(TypeError, match="masked"):
+        take(np.ma.array(frame))
