@@ -32,12 +32,12 @@ def main() -> None:
     found = fields.measure("rpm", disc_region)
     centre = [fields.measure(f"rotation_centre_{axis}", disc_region) for axis in "xy"]
     readings = found.value
-    axis = centre[0].value[-1] + CORNER[0], centre[1].value[-1] + CORNER[1]
+    axis = [float(along.value.mean()) + corner for along, corner in zip(centre, CORNER, strict=True)]
     print("frame      rpm      sd     axis, px")
     for k, (rpm, std) in enumerate(zip(found.value, found.std, strict=True)):
         print(f"{k + 1:5}  {rpm:7.3f}  {std:6.3f}      ({centre[0].value[k] + CORNER[0]:6.1f}, {centre[1].value[k] + CORNER[1]:6.1f})")
     mean, error = np.mean(readings), np.std(readings, ddof=1) / np.sqrt(len(readings))
-    print(f"rotation speed {mean:.3f} +- {error:.3f} rpm, truth {RPM} rpm; axis truth {AXIS}")
+    print(f"rotation speed {mean:.3f} +- {error:.3f} rpm, truth {RPM} rpm; axis ({axis[0]:.1f}, {axis[1]:.1f}), truth {AXIS}")
     check("rpm", float(mean), RPM, 0.02 * RPM)
     check("axis x", axis[0], AXIS[0], 5.0)
     check("axis y", axis[1], AXIS[1], 5.0)
