@@ -83,7 +83,8 @@ class ParticleTracks(Brief):
     @property
     def ids(self) -> NDArray[np.int64]:
         """Numbers of all targets that occur, ascending, (n,), no unit."""
-        return np.unique(np.concatenate([np.zeros(0, np.int64), *(step.ids for step in self.steps)]))
+        numbers: NDArray[np.int64] = np.unique(np.concatenate([np.zeros(0, np.int64), *(step.ids for step in self.steps)]))
+        return numbers
 
     def track(self, id: int) -> ParticleTrack:
         """One target through all T frames, lengths in px. ValueError for an `id` that does not occur."""

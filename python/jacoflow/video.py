@@ -81,7 +81,7 @@ class Video:
     ) -> None:
         """Opens the file and reads its header; shapes and units as in `frames`."""
         for name, value in (("start", start), ("stop", stop), ("step", step)):
-            if not (hasattr(value, "__index__") or (name == "stop" and value is None)) or np.ndim(value):
+            if not isinstance(value, int | np.integer) and not (name == "stop" and value is None):
                 raise TypeError(f"{name}: expected an integer, got {type(value).__name__}")
         if start < 0:
             raise ValueError(f"start: expected 0 or more frames, got {start}")
