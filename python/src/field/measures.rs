@@ -122,7 +122,7 @@ impl FlowField {
     /// is "no_dominant_motion" and the value NaN; with `at`, a pixel (x, y), that of the sites around it,
     /// however few they are. u and v are those at the region's centre. A site follows the motion where its
     /// flow differs by no more than its standard deviation and .1 px/frame explain at 99 %: motions that
-    /// differ by less are not told apart, and `std` does not hold that. ValueError for
+    /// differ by less are not separated, and `std` does not hold that. ValueError for
     /// unknown names, a region or pixel outside the frame, and for a field without covariance.
     ///
     /// >>> import jacoflow
