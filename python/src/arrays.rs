@@ -163,6 +163,8 @@ pub struct Frames<'py> {
     colour: ColourRule,
     /// Number of frames.
     pub count: usize,
+    /// What each is called in messages; "frames" where there are no names.
+    names: &'static [&'static str],
 }
 
 impl<'py> Frames<'py> {
@@ -172,12 +174,12 @@ impl<'py> Frames<'py> {
         let is_sequence =
             object.is_instance_of::<pyo3::types::PyList>() || object.is_instance_of::<pyo3::types::PyTuple>();
         if is_sequence {
-            return Ok(Self { count: object.len()?, object: object.clone(), colour });
+            return Ok(Self { count: object.len()?, object: object.clone(), colour, names: &[] });
         }
         if object.cast::<PyIterator>().is_ok() {
             let list = object.try_iter()?.collect::<PyResult<Vec<_>>>()?;
             let list = PyList::new(object.py(), list)?;
-            return Ok(Self { count: list.len(), object: list.into_any(), colour });
+            return Ok(Self { count: list.len(), object: list.into_any(), colour, names: &[] });
         }
         refuse_path("frames", object)?;
         let array = native(object)?;
@@ -195,18 +197,29 @@ impl<'py> Frames<'py> {
             [_, rows, 3 | 4] if rows > 4 => refuse(
                 ", which looks like one colour image; pass a list of frames, or a stack (T, H, W, 3) with colour=\"luminance\"",
             ),
-            [count, _, _] => Ok(Self { count, object: array.into_any(), colour }),
+            [count, _, _] => Ok(Self { count, object: array.into_any(), colour, names: &[] }),
             [count, _, _, 3 | 4] if colour == ColourRule::Luminance => {
-                Ok(Self { count, object: array.into_any(), colour })
+                Ok(Self { count, object: array.into_any(), colour, names: &[] })
             }
             [_, _, _, 3 | 4] => refuse("; for colour frames pass colour=\"luminance\""),
             _ => refuse(""),
         }
     }
 
+    /// The same, of frames that are arguments of their own.
+    pub fn named(self, names: &'static [&'static str]) -> Self {
+        Self { names, ..self }
+    }
+
+    /// What frame `index` came as.
+    pub fn item(&self, index: usize) -> Outcome<Bound<'py, PyAny>> {
+        Ok(self.object.get_item(index)?)
+    }
+
     /// Frame `index`.
     pub fn get(&self, index: usize) -> Outcome<AnyFrame> {
-        frame_with_gaps("frames", &self.object.get_item(index)?, self.colour)
+        let name = self.names.get(index).copied().unwrap_or("frames");
+        frame_with_gaps(name, &self.item(index)?, self.colour)
     }
 }
 
@@ -276,6 +289,20 @@ pub fn doubles(argument: &'static str, object: &Bound<'_, PyAny>) -> Outcome<(Ve
     }
     let wide = array.call_method1("astype", ("float64",))?.cast_into::<PyUntypedArray>()?;
     Ok((array.shape().to_vec(), elements::<f64>(&wide).unwrap_or_default()))
+}
+
+/// Two numbers, out of anything numpy can read as such.
+pub fn pair(argument: &'static str, expected: &str, object: &Bound<'_, PyAny>) -> Outcome<(f64, f64)> {
+    let (shape, values) = doubles(argument, object)?;
+    match values[..] {
+        [x, y] if shape == [2] => Ok((x, y)),
+        _ => Err(Error::argument(argument, expected, format!("shape {}", shape_text(&shape))).into()),
+    }
+}
+
+/// The name of an object's type, for messages.
+pub fn kind_of(object: &Bound<'_, PyAny>) -> String {
+    object.get_type().name().map_or_else(|_| "another object".into(), |name| name.to_string())
 }
 
 /// A new array that owns `values`, of the given shape, row-major.

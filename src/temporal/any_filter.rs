@@ -1,5 +1,6 @@
 //! A flow filter whose precision and sample type are those of its first frame.
 
+use super::smoother::smooth;
 use super::{FlowFilter, FlowFilterOptions, SavedFilter};
 use crate::error::{Error, Result};
 use crate::image::Preprocess;
@@ -96,6 +97,32 @@ impl AnyFlowFilter {
             Filter::Single(filter) => advance(filter, &self.preprocess, frame).map(AnyField::Single),
             Filter::Double(filter) => advance(filter, &self.preprocess, frame).map(AnyField::Double),
         }
+    }
+
+    /// The field of each of some frames from the frames before and after it, by filters that start anew; this
+    /// one stays as it is. See [`smoother`](super::smoother).
+    ///
+    /// # Errors
+    /// Those of [`push`](Self::push), naming `frames`.
+    pub fn smooth(&self, frames: &[AnyFrame]) -> Result<Vec<AnyField>> {
+        let Some(first) = frames.first() else { return Ok(Vec::new()) };
+        if let Some(other) = frames.iter().find(|frame| frame.dtype() != first.dtype()) {
+            let (expected, got) = (format!("{} like the first frame", first.dtype()), other.dtype().into());
+            return Err(Error::Type { argument: "frames", expected, got });
+        }
+        let options = FlowFilterOptions { full_scale: self.full_scale(first), ..self.options.clone() };
+        Ok(if self.precision.is_double(first.dtype()) {
+            self.smoothed::<f64>(options, frames)?.into_iter().map(AnyField::Double).collect()
+        } else {
+            self.smoothed::<f32>(options, frames)?.into_iter().map(AnyField::Single).collect()
+        })
+    }
+
+    fn smoothed<T: SimdReal>(&self, options: FlowFilterOptions, frames: &[AnyFrame]) -> Result<Vec<FlowField<T>>> {
+        let filter = FlowFilter::<T>::new(frames[0].size(), options)?;
+        let prepare = |frame: &AnyFrame| self.preprocess.apply(frame.to_real());
+        let prepared: Vec<_> = filter.options().threads.install(|| frames.iter().map(prepare).collect());
+        smooth(&filter, &prepared)
     }
 
     /// Forgets every frame.

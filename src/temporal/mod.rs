@@ -2,8 +2,8 @@
 //!
 //! * [`FlowFilter`], the dense filter of WO2010/098160, (44)-(55): one small Kalman filter a pixel. A frame
 //!   passes `measurement` (jets of the frame), `kernel` (prediction and update of many pixels at once) and
-//!   `flow_filter` (the field); `store` holds the states, `persist` saves them. `any_filter` chooses its
-//!   precision by the first frame.
+//!   `flow_filter` (the field); `store` holds the states, `persist` saves them; `smoother` joins two filters,
+//!   one of which runs backwards. `any_filter` chooses the precision by the first frame.
 //! * [`FlowStream`] estimates [`flow`](crate::flow) from frames that come one by one; [`recursive`] fuses its
 //!   estimates over time.
 
@@ -15,6 +15,7 @@ mod measurement;
 mod options;
 mod persist;
 pub mod recursive;
+mod smoother;
 mod store;
 mod stream;
 

@@ -174,7 +174,11 @@ impl FlowFilterOptions {
     }
 
     pub(super) fn motion_first(&self) -> bool {
-        self.form == FilterForm::Fast || self.square_root == Some(SquareRoot::MotionFirst)
+        match self.form {
+            FilterForm::Fast => true,
+            FilterForm::Extended => false,
+            _ => self.square_root == Some(SquareRoot::MotionFirst),
+        }
     }
 
     /// Refuses values that no filter can run with.

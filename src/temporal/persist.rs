@@ -1,9 +1,9 @@
 //! Saving the filter's state and going on from it, bit for bit.
 //!
 //! One format, `.npz`: a text `header` (JSON: version, precision, sizes, options), `status` of every site (0
-//! where there is a filter, else the code of [`Status`]), `mean` `(filters, 12)`, `covariance` `(filters,
-//! 78)` (lower triangles, row by row), `noise_scale` `(filters, 1)` and, where there is one, `mask` `(height,
-//! width)`. numpy can read it.
+//! where there is a filter, else the code of [`Status`]), `mean` `(filters, 12)`, `root` `(filters, 78)`
+//! (lower triangles of the covariance's root, row by row, the state in the order of the options),
+//! `noise_scale` `(filters, 1)` and, where there is one, `mask` `(height, width)`. numpy can read it.
 
 use super::{
     flow_filter::FlowFilter, kernel::N, kernel::PACKED, kernel::SCALE, kernel::packed, options::FlowFilterOptions,
@@ -18,7 +18,7 @@ use std::io::{Cursor, Read, Seek, Write};
 use std::path::Path;
 
 /// Rises when the meaning of a file changes.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 const FORMAT: &str = "jacoflow flow filter";
 
 #[derive(Serialize, Deserialize)]
@@ -81,7 +81,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
         writer.text("header", &text)?;
         let filters = self.store.sites.len();
         writer.array("mean", &[filters, N], &self.store.gather(0, N))?;
-        writer.array("covariance", &[filters, PACKED], &self.store.gather(N, PACKED))?;
+        writer.array("root", &[filters, PACKED], &self.store.gather(N, PACKED))?;
         writer.array("noise_scale", &[filters, 1], &self.store.gather(SCALE, 1))?;
         let status: Vec<u8> = self.store.fixed.iter().map(|&status| status as u8).collect();
         let (width, height) = self.options.sites.shape(self.frame_size)?;
@@ -111,7 +111,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
             options.mask = Some(Frame::new(width, height, array.values.iter().map(|&used| used != 0).collect())?);
         }
         let mean = reader.array::<T>("mean")?;
-        let covariance = reader.array::<T>("covariance")?;
+        let root = reader.array::<T>("root")?;
         let scale = reader.array::<T>("noise_scale")?;
         // Nothing of the claimed size is allocated before the file has shown that it holds as much.
         let status = reader.array::<u8>("status")?;
@@ -121,7 +121,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
             return Err(wrong(format!("expected a status of shape {expected}, got {got}")));
         }
         let filters = status.values.iter().map(|&code| usize::from(code == Status::Ok as u8)).sum::<usize>();
-        let arrays = [("mean", &mean, N), ("covariance", &covariance, PACKED), ("noise_scale", &scale, 1)];
+        let arrays = [("mean", &mean, N), ("root", &root, PACKED), ("noise_scale", &scale, 1)];
         for (name, array, columns) in arrays {
             if array.shape != [filters, columns] {
                 let (expected, got) = (shape_text(&[filters, columns]), shape_text(&array.shape));
@@ -136,7 +136,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
             return Err(wrong("the status does not fit the options".into()));
         }
         filter.store.scatter(0, N, &mean.values);
-        filter.store.scatter(N, PACKED, &covariance.values);
+        filter.store.scatter(N, PACKED, &root.values);
         filter.store.scatter(SCALE, 1, &scale.values);
         filter.frames = header.frames;
         filter.repairs = header.repairs;
@@ -146,10 +146,11 @@ impl<T: SimdReal + Element> FlowFilter<T> {
 
 /// Refuses numbers that no filter leaves, in rows of `columns`: the next frame's squares would not be finite.
 fn check_numbers<T: SimdReal>(name: &str, values: &[T], columns: usize) -> std::result::Result<(), String> {
-    let max = if size_of::<T>() == 4 { f64::from(f32::MAX) } else { f64::MAX }.sqrt();
-    let is_variance = |column: usize| name == "covariance" && (0..N).any(|k| packed(k, k) == column);
+    let square = if size_of::<T>() == 4 { f64::from(f32::MAX) } else { f64::MAX }.sqrt();
+    let max = if name == "root" { square.sqrt() } else { square };
+    let is_deviation = |column: usize| name == "root" && (0..N).any(|k| packed(k, k) == column);
     for (at, value) in values.iter().map(|value| value.to_f64()).enumerate() {
-        let least = if is_variance(at % columns) || name == "noise_scale" { 0.0 } else { -max };
+        let least = if is_deviation(at % columns) || name == "noise_scale" { 0.0 } else { -max };
         if !(least..=max).contains(&value) {
             return Err(format!("array '{name}' holds {value:e}, expected numbers from {least:e} to {max:e}"));
         }

@@ -1,6 +1,7 @@
 //! The states of all sites, in blocks.
 
-use super::kernel::{BLOCK, Constants, N, PACKED, PLANES, SCALE, packed};
+use super::kernel::factor::square;
+use super::kernel::{BLOCK, Constants, N, PACKED, PLANES, SCALE, order, packed, places};
 use super::options::FlowFilterOptions;
 use crate::error::Result;
 use crate::jet::Reach;
@@ -19,6 +20,8 @@ pub(super) struct Store<T> {
     pub fixed: Vec<Status>,
     /// The states.
     pub blocks: Vec<T>,
+    /// Whether the root takes the motion first.
+    pub motion_first: bool,
 }
 
 impl<T: SimdReal> Store<T> {
@@ -59,12 +62,13 @@ impl<T: SimdReal> Store<T> {
         for block in blocks.chunks_exact_mut(PLANES * BLOCK) {
             for k in 0..N {
                 block[k * BLOCK..(k + 1) * BLOCK].fill(constants.start.0[k]);
-                let variance = N + packed(k, k);
-                block[variance * BLOCK..(variance + 1) * BLOCK].fill(constants.start.1[k]);
+                let deviation = constants.start.1[order(constants.motion_first)[k]].to_f64().sqrt();
+                let plane = N + packed(k, k);
+                block[plane * BLOCK..(plane + 1) * BLOCK].fill(T::from_f64(deviation));
             }
             block[SCALE * BLOCK..].fill(T::from_f64(1.0));
         }
-        Ok(Self { pixels, sites, fixed, blocks })
+        Ok(Self { pixels, sites, fixed, blocks, motion_first: constants.motion_first })
     }
 
     /// Planes `from .. from + count` of every filter, one row a filter.
@@ -93,7 +97,8 @@ impl<T: SimdReal> Store<T> {
     pub(super) fn state(&self, index: usize) -> ([f64; N], [[f64; N]; N]) {
         let block = &self.blocks[index / BLOCK * PLANES * BLOCK..][..PLANES * BLOCK];
         let value = |plane: usize| block[plane * BLOCK + index % BLOCK].to_f64();
-        let cov: [f64; PACKED] = std::array::from_fn(|k| value(N + k));
+        let root: [f64; PACKED] = std::array::from_fn(|k| value(N + k));
+        let cov = square(&root, places(self.motion_first));
         (std::array::from_fn(value), std::array::from_fn(|a| std::array::from_fn(|b| cov[packed(a, b)])))
     }
 }

@@ -10,6 +10,7 @@ use jacoflow::temporal::{FilterForm, FlowFilter, FlowFilterOptions, Transition};
 use jacoflow::types::{Frame, Mask, Rect, SamplingGrid, Status, Units};
 use std::f64::consts::PI;
 
+mod definiteness;
 mod equivalence;
 mod promises;
 mod robustness;

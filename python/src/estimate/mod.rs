@@ -21,14 +21,18 @@ use pyo3::types::{PyList, PyTuple};
 pub use stream::{FlowEstimator, restore_estimator};
 
 /// Fields of a stack as they come.
-enum Growing {
+pub enum Growing {
+    /// Of no field yet.
     None,
+    /// f32 planes.
     Single(Packed<f32>),
+    /// f64 planes.
     Double(Packed<f64>),
 }
 
 impl Growing {
-    fn add(&mut self, field: AnyField) -> jacoflow::Result<()> {
+    /// Adds the next field.
+    pub fn add(&mut self, field: AnyField) -> jacoflow::Result<()> {
         match (&mut *self, field) {
             (Self::Single(packed), AnyField::Single(field)) => packed.append(field),
             (Self::Double(packed), AnyField::Double(field)) => packed.append(field),
@@ -58,7 +62,8 @@ impl Growing {
         })
     }
 
-    fn finish(self) -> Outcome<FlowField> {
+    /// The stack.
+    pub fn finish(self) -> Outcome<FlowField> {
         match self {
             Self::Single(packed) => Ok(FlowField::stack(packed)),
             Self::Double(packed) => Ok(FlowField::stack(packed)),
@@ -283,7 +288,7 @@ fn estimate_sequence(
 /// What `flow` does.
 fn estimate_one(frames: &Bound<'_, PyList>, arguments: Arguments) -> Outcome<FlowField> {
     let py = frames.py();
-    let frames = Frames::new(frames, arguments.colour(py)?)?;
+    let frames = Frames::new(frames, arguments.colour(py)?)?.named(&["first", "second", "third"]);
     let mut stream = arguments.stream(py, frames.count == 2)?;
     let needed = stream.plan().estimator().frames_needed();
     if frames.count != needed {

@@ -2,15 +2,17 @@
 
 mod arguments;
 
-use super::arrays::{self, ColourRule};
+use super::arrays::{self, ColourRule, Frames};
+use super::estimate::Growing;
 use super::options::{self, Integer, Object, PreprocessOptions};
-use super::{field::FlowField, keywords::constructor, keywords::with_common};
+use super::{field::FlowField, keywords::constructor, keywords::with_common, samples::is_masked};
 use crate::errors::Outcome;
-use crate::interrupt::alone;
+use crate::image::renamed;
+use crate::interrupt::{alone, interruptible};
 use arguments::{Arguments, filter_options};
 use jacoflow::error::Error;
 use jacoflow::temporal::AnyFlowFilter;
-use jacoflow::types::SamplingGrid;
+use jacoflow::types::{AnyFrame, SamplingGrid};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
@@ -35,15 +37,39 @@ filter_options!(constructor [FlowFilter from Arguments]);
 impl FlowFilter {
     /// Takes in the next frame (H, W) and returns the FlowField after it, px/frame.
     ///
-    /// Where a neighbourhood holds NaN the filter only predicts, and the result is NaN with status
-    /// NON_FINITE. Where the frame contradicts the prediction (black, flashed, dropped) the motion is that of
-    /// the frames before, with status PREDICTED. ValueError for a frame of another size, TypeError for
-    /// another dtype; the filter is then unchanged.
+    /// Where a neighbourhood holds NaN or a masked pixel the filter only predicts, and the result is NaN with
+    /// status NON_FINITE. Where the frame contradicts the prediction (black, flashed, dropped) the motion is
+    /// that of the frames before, with status PREDICTED. ValueError for a frame of another size, and for masked
+    /// uint16 frames without `full_scale`; TypeError for another dtype; the filter is then unchanged.
     fn push(slf: &Bound<'_, Self>, frame: &Bound<'_, PyAny>) -> Outcome<FlowField> {
         let (py, mut this) = (slf.py(), alone(slf)?);
-        let frame = arrays::frame("frame", frame, this.colour)?;
+        let frame = this.frame("frame", frame)?;
         let filter = &mut this.filter;
         Ok(FlowField::any(py.detach(|| filter.push(&frame)).map_err(named)?))
+    }
+
+    /// The fields of all `frames` (T, H, W), a stack of T, each from the frames before and after it.
+    ///
+    /// A two-filter smoother (Fraser and Potter, 1969): two filters with these options run through the frames,
+    /// one of them backwards, and are joined at each frame. No lag, and at most the variance of the filter.
+    /// Where a frame is missing the motion is that of the frames around it, with status PREDICTED. The filter
+    /// itself stays as it is. All frames and fields are held in memory. Ctrl-C stops it. ValueError for frames
+    /// of different sizes, TypeError for different dtypes.
+    fn smooth(slf: &Bound<'_, Self>, frames: &Bound<'_, PyAny>) -> Outcome<FlowField> {
+        let (py, this) = (slf.py(), alone(slf)?);
+        let frames = Frames::new(frames, this.colour)?;
+        if frames.count == 0 {
+            return Err(Error::argument("frames", "at least 1 frame", "0 frames").into());
+        }
+        let frame = |index| this.frame("frames", &frames.item(index)?);
+        let frames = (0..frames.count).map(frame).collect::<Outcome<Vec<_>>>()?;
+        let filter = &this.filter;
+        let smoothed = interruptible(py, || filter.smooth(&frames).map_err(|error| renamed(error, "frame", "frames")))?;
+        let mut fields = Growing::None;
+        for field in smoothed {
+            fields.add(field)?;
+        }
+        fields.finish()
     }
 
     /// Forgets every frame (H, W): the next one starts new filters.
@@ -120,6 +146,18 @@ impl FlowFilter {
 }
 
 impl FlowFilter {
+    /// A frame as the filter takes it: masked pixels are NaN.
+    fn frame(&self, argument: &str, object: &Bound<'_, PyAny>) -> Outcome<AnyFrame> {
+        let frame = arrays::frame_with_gaps(argument, object, self.colour)?;
+        // With the mask the samples have lost their type, and the scale that it stands for.
+        let full_scale: Option<f64> = self.arguments.profile(object.py())?.1.get("full_scale")?;
+        if full_scale.is_none() && is_masked(object)? && object.getattr("dtype")?.eq("uint16")? {
+            let expected = "the sample value of 255 grey levels (FilterProfile(full_scale=)) for masked uint16 frames";
+            return Err(Error::argument("full_scale", expected, "none").into());
+        }
+        Ok(frame)
+    }
+
     fn from_arguments(py: Python<'_>, arguments: Arguments) -> Outcome<Self> {
         let arguments = arguments.keep(py)?;
         let options = arguments.options(py)?;

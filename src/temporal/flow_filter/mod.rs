@@ -12,7 +12,8 @@ use crate::jet::JetStencil;
 use crate::parallel::Threads;
 use crate::simd::{Level, SimdReal};
 use crate::types::{FieldLayout, FlowField, Frame, Interval, MOTION_NAMES, Status};
-use pass::{COVARIANCE, Mark, PAIRS, RESIDUAL, Rows};
+pub(super) use pass::PAIRS;
+use pass::{COVARIANCE, Mark, RESIDUAL, Rows};
 use rayon::prelude::*;
 
 /// One Kalman filter a site, fed with frames: WO2010/098160, (44), (54), (55).

@@ -6,7 +6,7 @@ use crate::simd::{Level, SimdReal, dispatch};
 use crate::temporal::kernel::predict::{AUGMENTED, EXTENDED, FAST, NON_AUGMENTED, Predict};
 use crate::temporal::kernel::transition::{Exact, Rk4, Step};
 use crate::temporal::kernel::update::{Decorrelation, MEASURED, PRESENT, SHARE, Update};
-use crate::temporal::kernel::{BLOCK, Constants, N, PLANES, packed};
+use crate::temporal::kernel::{BLOCK, Constants, N, PLANES, packed, places};
 use crate::temporal::measurement::{Fit, Measure};
 use crate::temporal::options::{FilterForm, Transition};
 use crate::types::Frame;
@@ -108,7 +108,7 @@ pub(super) const RESIDUAL: usize = 6;
 pub(super) const COVARIANCE: usize = 7;
 
 /// The upper triangle of the motion's covariance, row by row.
-pub(super) const PAIRS: [(usize, usize); 21] = {
+pub(in crate::temporal) const PAIRS: [(usize, usize); 21] = {
     let mut pairs = [(0, 0); 21];
     let (mut k, mut a) = (0, 0);
     while a < 6 {
@@ -143,12 +143,13 @@ impl<T: SimdReal> Pass<'_, T> {
         let zero = T::from_f64(0.0);
         let (mut measured, mut residual) = ([zero; PASS_BLOCKS * MEASURED * BLOCK], [zero; PASS_BLOCKS * BLOCK]);
         let mut events = [0u8; PASS_BLOCKS * BLOCK];
+        let places = places(constants.motion_first);
         let measured = &mut measured[..marks.len() * MEASURED * BLOCK];
         let (events, residual) = (&mut events[..pixels.len()], &mut residual[..pixels.len()]);
         dispatch(level, Measure { frame, pixels, fit, scale, measured, residual });
         match self.transition {
-            Transition::Rk4 => predict::<T, Rk4>(level, self.form, blocks, events, constants),
-            Transition::Exact => predict::<T, Exact>(level, self.form, blocks, events, constants),
+            Transition::Rk4 => predict::<T, Rk4>(level, self.form, blocks, constants),
+            Transition::Exact => predict::<T, Exact>(level, self.form, blocks, constants),
         }
         dispatch(level, Update { blocks, measured, events, decorrelation, constants, is_first });
         for (b, mark) in marks.iter_mut().enumerate() {
@@ -163,8 +164,14 @@ impl<T: SimdReal> Pass<'_, T> {
             out[RESIDUAL * BLOCK..COVARIANCE * BLOCK].copy_from_slice(&residual[b * BLOCK..(b + 1) * BLOCK]);
             let (motion, covariance) = out.split_at_mut(COVARIANCE * BLOCK);
             for (row, &(i, j)) in covariance.chunks_exact_mut(BLOCK).zip(&PAIRS[..rows.covariance]) {
-                let plane = N + packed(6 + i, 6 + j);
-                row.copy_from_slice(&block[plane * BLOCK..(plane + 1) * BLOCK]);
+                let (i, j) = (places[6 + i], places[6 + j]);
+                row.fill(zero);
+                for k in 0..=i.min(j) {
+                    let plane = |place: usize| &block[(N + packed(place, k)) * BLOCK..][..BLOCK];
+                    for ((sum, &a), &b) in row.iter_mut().zip(plane(i)).zip(plane(j)) {
+                        *sum += a * b;
+                    }
+                }
             }
             let shares = row(SHARE).iter().enumerate().filter(|&(_, &share)| rows.covariance > 0 && share > zero);
             for (k, &share) in shares {
@@ -196,20 +203,14 @@ pub(super) struct Mark {
     pub missing: [u8; BLOCK],
 }
 
-fn predict<T: SimdReal, S: Step>(
-    level: Level,
-    form: FilterForm,
-    blocks: &mut [T],
-    events: &mut [u8],
-    constants: &Constants<T>,
-) {
+fn predict<T: SimdReal, S: Step>(level: Level, form: FilterForm, blocks: &mut [T], constants: &Constants<T>) {
     let step = PhantomData::<S>;
     match form {
-        FilterForm::Augmented => dispatch(level, Predict::<T, S, AUGMENTED> { blocks, events, constants, step }),
+        FilterForm::Augmented => dispatch(level, Predict::<T, S, AUGMENTED> { blocks, constants, step }),
         FilterForm::NonAugmented => {
-            dispatch(level, Predict::<T, S, NON_AUGMENTED> { blocks, events, constants, step });
+            dispatch(level, Predict::<T, S, NON_AUGMENTED> { blocks, constants, step });
         }
-        FilterForm::Fast => dispatch(level, Predict::<T, S, FAST> { blocks, events, constants, step }),
-        FilterForm::Extended => dispatch(level, Predict::<T, S, EXTENDED> { blocks, events, constants, step }),
+        FilterForm::Fast => dispatch(level, Predict::<T, S, FAST> { blocks, constants, step }),
+        FilterForm::Extended => dispatch(level, Predict::<T, S, EXTENDED> { blocks, constants, step }),
     }
 }

@@ -1,46 +1,71 @@
-//! The Cholesky factor of a covariance, and what is done with a covariance that has none.
+//! The lower root of a covariance, and what is done with a covariance that has none.
 
 use super::{BLOCK, Constants, N, PACKED, packed};
 use crate::math::Real;
 use crate::simd::{Lanes, SimdReal};
 
-/// The columns of a factor, zero above its diagonal: `columns[k][state index]`.
+/// The columns of a root, zero above its diagonal: `columns[place][state index]` or `columns[place][place]`.
 pub(super) type Columns<V> = [[V; N]; N];
 
-/// Factors `cov`, with the state in `order`, left to right into columns whose upper part is zero already.
-/// Returns one in each lane whose pivots were all positive.
+/// How small a pivot may be relative to its variance before it is rounding, in units of the last place.
+const PIVOT_ULPS: f64 = 4.0;
+
+/// The rounding of a pivot relative to its variance.
+fn pivot_rounding<T: SimdReal>() -> f64 {
+    PIVOT_ULPS * if size_of::<T>() == 4 { f64::from(f32::EPSILON) } else { f64::EPSILON }
+}
+
+/// The lower root of `cov` with the components in `order`, into columns whose upper part is zero already. A
+/// pivot that is lost to rounding is raised to its size. Returns one in each lane whose pivots were all
+/// positive to rounding.
 #[inline(always)]
 pub(super) fn factor<V: Lanes>(cov: &[V; PACKED], order: &[usize; N], columns: &mut Columns<V>) -> V {
     let mut ok = V::constant(1.0);
+    for j in 0..N {
+        for i in j..N {
+            columns[j][i] = cov[packed(order[i], order[j])];
+        }
+    }
     macro_rules! all {
-        ($($j:literal)*) => { $(column::<V, $j>(cov, order, columns, &mut ok);)* };
+        ($($j:literal)*) => { $(column::<V, $j>(columns, &mut ok);)* };
     }
     all!(0 1 2 3 4 5 6 7 8 9 10 11);
     ok
 }
 
 #[inline(always)]
-fn column<V: Lanes, const J: usize>(cov: &[V; PACKED], order: &[usize; N], columns: &mut Columns<V>, ok: &mut V) {
+fn column<V: Lanes, const J: usize>(columns: &mut Columns<V>, ok: &mut V) {
     let mut rest = [V::zero(); N];
-    for i in J..N {
-        rest[i] = cov[packed(order[i], order[J])];
-    }
+    rest[J..N].copy_from_slice(&columns[J][J..N]);
+    let rounding = rest[J] * V::constant(pivot_rounding::<V::Scalar>());
     for k in 0..J {
-        let factor = columns[k][order[J]];
+        let factor = columns[k][J];
         for i in J..N {
-            rest[i] = columns[k][order[i]].neg_mul_add(factor, rest[i]);
+            rest[i] = columns[k][i].neg_mul_add(factor, rest[i]);
         }
     }
-    *ok = V::select(V::zero().lt(rest[J]), *ok, V::zero());
-    let root = rest[J].sqrt();
+    *ok = V::select((rounding * V::constant(-(N as f64))).lt(rest[J]), *ok, V::zero());
+    let root = rounding.max(rest[J]).sqrt();
     let inverse = V::constant(1.0) / root;
-    columns[J][order[J]] = root;
+    columns[J][J] = root;
     for i in J + 1..N {
-        columns[J][order[i]] = rest[i] * inverse;
+        columns[J][i] = rest[i] * inverse;
     }
 }
 
-/// Gives pixel `lane` of a block a covariance that has a factor: a loaded diagonal, or a new start.
+/// The covariance of one pixel, packed by components, of a root packed by places.
+pub(in crate::temporal) fn square(root: &[f64; PACKED], places: &[usize; N]) -> [f64; PACKED] {
+    let mut cov = [0.0; PACKED];
+    for a in 0..N {
+        for b in 0..=a {
+            let (i, j) = (places[a], places[b]);
+            cov[packed(a, b)] = (0..=i.min(j)).map(|k| root[packed(i, k)] * root[packed(j, k)]).sum();
+        }
+    }
+    cov
+}
+
+/// Gives pixel `lane` of a block a covariance that has a root: a loaded diagonal, or a new start.
 #[cold]
 #[inline(never)]
 pub(super) fn repair<T: SimdReal>(block: &mut [T], lane: usize, constants: &Constants<T>) {

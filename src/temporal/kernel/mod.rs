@@ -4,6 +4,10 @@
 //! kernel of its own, so that the number of compiled variants is a sum, not a product. `predict` moves
 //! sigma points by `transition` with process `noise` and sums their `moments`; `update` takes the measured
 //! jet; `factor` and `vector` serve both.
+//!
+//! Between frames a state holds the lower root `L` of its covariance `L L^T`, with the components in
+//! [`order`]: the product is definite whatever rounding does, and the next prediction spreads its sigma points
+//! by the root. From `predict` to `update` the same planes hold the predicted covariance.
 
 pub(super) mod factor;
 mod moments;
@@ -32,6 +36,24 @@ pub(super) const BLOCK: usize = 16;
 #[inline(always)]
 pub(super) const fn packed(a: usize, b: usize) -> usize {
     if a >= b { a * (a + 1) / 2 + b } else { b * (b + 1) / 2 + a }
+}
+
+/// The components in the order of the root: brightness first, as the state stands and `filterpy` does.
+const BRIGHTNESS_FIRST: [usize; N] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+/// Motion first, then the Hessian, the gradient and `I`: the last columns touch ever less.
+const MOTION_FIRST: [usize; N] = [6, 7, 8, 9, 10, 11, 5, 4, 3, 2, 1, 0];
+
+/// The component at each place of the root.
+#[inline(always)]
+pub(super) const fn order(motion_first: bool) -> &'static [usize; N] {
+    if motion_first { &MOTION_FIRST } else { &BRIGHTNESS_FIRST }
+}
+
+/// The place of each component in the root.
+#[inline(always)]
+pub(super) const fn places(motion_first: bool) -> &'static [usize; N] {
+    const MOTION_FIRST_PLACES: [usize; N] = [11, 10, 9, 8, 7, 6, 0, 1, 2, 3, 4, 5];
+    if motion_first { &MOTION_FIRST_PLACES } else { &BRIGHTNESS_FIRST }
 }
 
 /// The filter's constants in working precision.
@@ -66,7 +88,7 @@ impl<T: SimdReal> Constants<T> {
     }
 }
 
-/// Mean and packed covariance of `V::LANES` pixels.
+/// Mean, and packed covariance or root, of `V::LANES` pixels.
 pub(super) struct Lane<V> {
     pub mean: [V; N],
     pub cov: [V; PACKED],

@@ -1,20 +1,14 @@
 //! Prediction over one frame: mean and covariance through the non-linear step, by one of the four forms.
 
-use super::factor::{Columns, factor, repair};
+use super::factor::Columns;
 use super::moments::{cross, outer};
 use super::noise::noise_pairs;
 use super::transition::{Generator, Step};
-use super::update::REPAIRED;
 use super::vector::{minus, plus, six, times};
-use super::{BLOCK, Constants, Lane, N, PLANES, failed, packed};
+use super::{BLOCK, Constants, Lane, N, PACKED, PLANES, order, packed};
 use crate::simd::{Kernel, Lanes, SimdReal};
 use crate::temporal::FilterForm;
 use std::marker::PhantomData;
-
-/// The square root takes the state as it stands: what the patent's form and `filterpy` do.
-const BRIGHTNESS_FIRST: [usize; N] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
-/// Motion first, then the Hessian, the gradient and `I`: the last columns touch ever less.
-const MOTION_FIRST: [usize; N] = [6, 7, 8, 9, 10, 11, 5, 4, 3, 2, 1, 0];
 
 /// Which form a kernel is compiled for; a value of [`FilterForm`] as a constant.
 pub(in crate::temporal) const AUGMENTED: u8 = FilterForm::Augmented as u8;
@@ -43,10 +37,8 @@ impl<V: Lanes> Scratch<V> {
 
 /// Predicts every pixel of some blocks in place.
 pub(in crate::temporal) struct Predict<'a, T, S, const FORM: u8> {
-    /// States.
+    /// States with roots; afterwards with the predicted covariances.
     pub blocks: &'a mut [T],
-    /// Receives [`REPAIRED`] of each pixel.
-    pub events: &'a mut [u8],
     pub constants: &'a Constants<T>,
     pub step: PhantomData<S>,
 }
@@ -56,29 +48,44 @@ impl<T: SimdReal, S: Step, const FORM: u8> Kernel<T> for Predict<'_, T, S, FORM>
 
     #[inline(always)]
     fn run<V: Lanes<Scalar = T>>(self) {
-        let motion_first = FORM == FAST || (FORM != EXTENDED && self.constants.motion_first);
         let mut scratch = Scratch::<V>::new();
-        for (block, events) in self.blocks.chunks_exact_mut(PLANES * BLOCK).zip(self.events.chunks_exact_mut(BLOCK)) {
+        for block in self.blocks.chunks_exact_mut(PLANES * BLOCK) {
             for at in (0..BLOCK).step_by(V::LANES) {
-                let mut lane = loop {
-                    let lane = Lane::<V>::load(block, at);
-                    let ok = if motion_first {
-                        factor(&lane.cov, &MOTION_FIRST, &mut scratch.columns)
-                    } else {
-                        factor(&lane.cov, &BRIGHTNESS_FIRST, &mut scratch.columns)
-                    };
-                    let bad = failed(ok);
-                    if bad == 0 {
-                        break lane;
-                    }
-                    for k in (0..V::LANES).filter(|k| bad >> k & 1 == 1) {
-                        repair(block, at + k, self.constants);
-                        events[at + k] |= REPAIRED;
-                    }
-                };
+                let mut lane = Lane::<V>::load(block, at);
+                if FORM == FAST || (FORM != EXTENDED && self.constants.motion_first) {
+                    spread(&lane.cov, order(true), &mut scratch.columns);
+                    motion_block::<V, 0>(&scratch.columns, &mut lane.cov);
+                } else {
+                    spread(&lane.cov, order(false), &mut scratch.columns);
+                    motion_block::<V, 6>(&scratch.columns, &mut lane.cov);
+                }
                 predict::<V, S, FORM>(&mut lane, &mut scratch, self.constants);
                 lane.store(block, at);
             }
+        }
+    }
+}
+
+/// The columns of a root, by components.
+#[inline(always)]
+fn spread<V: Lanes>(root: &[V; PACKED], order: &[usize; N], columns: &mut Columns<V>) {
+    for j in 0..N {
+        for i in j..N {
+            columns[j][order[i]] = root[packed(i, j)];
+        }
+    }
+}
+
+/// The covariance of the motion, whose columns of its own begin with `FIRST`.
+#[inline(always)]
+fn motion_block<V: Lanes, const FIRST: usize>(columns: &Columns<V>, cov: &mut [V; PACKED]) {
+    for a in 0..6 {
+        for b in 0..=a {
+            let mut sum = V::zero();
+            for k in 0..=FIRST + b {
+                sum = columns[k][6 + a].mul_add(columns[k][6 + b], sum);
+            }
+            cov[packed(6 + a, 6 + b)] = sum;
         }
     }
 }

@@ -11,7 +11,8 @@
 // Unrolled loops compare constant indices, the smallest of which is zero.
 #![allow(clippy::absurd_extreme_comparisons)]
 
-use super::{BLOCK, Constants, Lane, N, PACKED, PLANES, SCALE, failed, packed, vector::for_six};
+use super::factor::{Columns, factor, repair};
+use super::{BLOCK, Constants, Lane, N, PACKED, PLANES, SCALE, failed, order, packed, vector::for_six};
 use crate::simd::{Kernel, Lanes, SimdReal};
 
 /// Normalised innovation squared beyond which the brightness starts anew: chi-square(6), one in ten thousand.
@@ -69,7 +70,7 @@ impl<T: SimdReal> Decorrelation<T> {
 
 /// Updates every pixel of some blocks in place.
 pub(in crate::temporal) struct Update<'a, T> {
-    /// States.
+    /// States with predicted covariances; afterwards with roots.
     pub blocks: &'a mut [T],
     /// Measured jets, six rows of `BLOCK` for each block, then `PRESENT`, `MISFIT` and `SHARE`.
     pub measured: &'a [T],
@@ -103,6 +104,7 @@ impl<T: SimdReal> Kernel<T> for Update<'_, T> {
         let blocks = self.blocks.chunks_exact_mut(PLANES * BLOCK);
         let inputs = self.measured.chunks_exact(MEASURED * BLOCK);
         let gate = if self.is_first { V::constant(f64::MAX) } else { V::splat(self.constants.gate) };
+        let mut columns: Columns<V> = [[V::zero(); N]; N];
         for ((block, input), events) in blocks.zip(inputs).zip(self.events.chunks_exact_mut(BLOCK)) {
             for at in (0..BLOCK).step_by(V::LANES) {
                 let mut lane = Lane::<V>::load(block, at);
@@ -124,16 +126,24 @@ impl<T: SimdReal> Kernel<T> for Update<'_, T> {
                     let scale = scale.max(V::constant(1.0)).min(V::constant(MAX_SCALE));
                     scale.store(&mut block[SCALE * BLOCK + at..]);
                 }
-                let bad = failed(sound(&lane));
-                lane.store(block, at);
-                for k in 0..V::LANES {
-                    if bad >> k & 1 == 1 {
-                        super::factor::repair(block, at + k, self.constants);
+                let bad = failed(root(&lane, self.constants.motion_first, &mut columns));
+                if bad != 0 {
+                    lane.store(block, at);
+                    for k in (0..V::LANES).filter(|k| bad >> k & 1 == 1) {
+                        repair(block, at + k, self.constants);
                         events[at + k] |= REPAIRED;
                     }
-                    if restarted >> k & 1 == 1 {
-                        events[at + k] |= RESTARTED;
+                    lane = Lane::load(block, at);
+                    root(&lane, self.constants.motion_first, &mut columns);
+                }
+                for i in 0..N {
+                    for j in 0..=i {
+                        lane.cov[packed(i, j)] = columns[j][i];
                     }
+                }
+                lane.store(block, at);
+                for k in (0..V::LANES).filter(|k| restarted >> k & 1 == 1) {
+                    events[at + k] |= RESTARTED;
                 }
             }
         }
@@ -381,16 +391,15 @@ fn take_in<V: Lanes, const J: usize>(lane: &mut Lane<V>, all: &mut Elimination<V
     });
 }
 
-/// One in each lane whose mean and variances are finite and whose variances are positive.
+/// The root of the covariance. Returns one in each lane that has one and whose mean is finite.
 #[inline(always)]
-fn sound<V: Lanes>(lane: &Lane<V>) -> V {
-    let zero = V::zero();
-    let (mut product, mut least) = (zero, lane.cov[0]);
+fn root<V: Lanes>(lane: &Lane<V>, motion_first: bool, columns: &mut Columns<V>) -> V {
+    let ok =
+        if motion_first { factor(&lane.cov, order(true), columns) } else { factor(&lane.cov, order(false), columns) };
+    let (zero, mut product) = (V::zero(), V::zero());
     for k in 0..N {
         // Zero times a finite number is zero; anything else is NaN.
-        let variance = lane.cov[packed(k, k)];
-        product = zero.mul_add(lane.mean[k], zero.mul_add(variance, product));
-        least = variance.min(least);
+        product = zero.mul_add(lane.mean[k], zero.mul_add(columns[k][k], product));
     }
-    V::select(zero.lt(least + product), V::constant(1.0), zero)
+    V::select(zero.lt(ok + product), V::constant(1.0), zero)
 }
