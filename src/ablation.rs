@@ -29,6 +29,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("flow.detail_bias", "motion that the finest detail of the frames contradicts over wide windows is moved"),
     ("flow.detail_scatter", "differences with and without the finest detail widen the covariance"),
     ("flow.block_matches", "blocks are searched for on a coarse level"),
+    ("flow.coarse_peak_locking", "peak locking is removed on every level before its motion is carried down"),
     ("flow.robust_peak_locking", "patches that scatter have little weight in peak locking"),
     ("edges.contrast", "gain between the cameras is estimated and taken out"),
     ("edges.refused_cost", "matches of a high cost are refused"),

@@ -14,12 +14,14 @@ mod weighted_median;
 
 use super::brightness_scale::BrightnessScale;
 use super::data_term::{COUNT, DataOptions, DataTerm, MOTION, summary};
+use super::peak_locking::PeakLocking;
 use super::plane_pool::PlanePool;
 use super::planes::Planes;
 use super::pyramid::{ComparedFrames, PyramidLevel};
 use super::resample::{coarser, finer};
 use super::schedule::{LevelSchedule, Schedule};
 use super::workspace::Workspace;
+use crate::ablation::keeps;
 use crate::simd::{Level, SimdReal};
 use comparison::Comparison;
 use intermediate::refine_intermediate;
@@ -208,6 +210,11 @@ impl DescentPlan {
             }
             if schedule.refines {
                 refine_intermediate(self.simd, space, &mut motion, step.data);
+            }
+            if k > to && keeps("flow.coarse_peak_locking") {
+                // What a level leaves of its own aliases is not corrected where finer levels have noise.
+                PeakLocking::measure(self.simd, (level, compared), &motion, step.residual_std)
+                    .correct(self.simd, &mut motion);
             }
             if self.keeps_levels && k > to {
                 coarser_motions.insert(0, copy(space, &motion));
