@@ -55,7 +55,7 @@ mod _jacoflow {
         dirichlet_mixture::{mixture_dirichlet_densities, mixture_dirichlet_fit},
         errors::{FormatError, JacoflowError, MissingDependencyError, NotObservableError, NumericalError},
         estimate::{FlowEstimator, estimate, flow, restore_estimator},
-        field::{FlowField, Measurement, quantities, restore_field, status_names},
+        field::{FlowField, Measurement, quantities, restore_field, restore_measurement, status_names},
         filters::{
             ExtendedKalmanFilter, GaussianFilter, KalmanFilter, MerweScaledSigmaPoints, ParticleFilter,
             UnscentedKalmanFilter, resample, restore_extended, restore_kalman, restore_particle, restore_unscented,

@@ -1,5 +1,7 @@
 """Quantities of regions: one motion, means, and rates that are those of the motion and not of its chord."""
 
+import pickle
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -189,3 +191,55 @@ def test_a_mean_stands_at_the_centre_of_its_region(region):
     assert_allclose(field.region_mean("speed", region)[0], np.hypot(*middle), atol=5e-3)
     distance = np.linalg.norm(np.linalg.solve(truth.jacobian[y, x], middle))
     assert_allclose(field.region_mean("centre_distance", region)[0], distance, atol=0.3)
+
+
+@pytest.mark.parametrize("difference", [0.15, 0.2, 0.25, 0.3])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_motions_that_are_not_separated_are_not_sure(difference, axis):
+    # Two halves, both texture, one of which moves by a fraction of a pixel; a tilted motion lies between.
+    x = np.arange(SIZE) - CENTRE[axis]
+    still, shifted = turned(PICTURE, 0.0), moved(PICTURE, np.eye(2), shift=(difference, 0.0))
+    side = (x > 0)[None, :] if axis == 0 else (x > 0)[:, None]
+    rng = np.random.default_rng(7)
+    frames = [np.clip(np.rint(view + rng.normal(0, 1, view.shape)), 0, 255).astype(np.uint8) for view in (still, np.where(side, shifted, still))]
+    found = jacoflow.flow(*frames).measure("u", (40, 40, 81, 81))
+    slope, std = found.motion[2 + 2 * axis], np.sqrt(found.covariance[2 + 2 * axis, 2 + 2 * axis])
+    nearest = min(abs(found.value), abs(found.value - difference))
+    assert nearest < 4 * found.std + 0.01 and abs(slope) < 4 * std + 1e-4, (found, slope, std)
+
+
+def test_a_mean_of_what_affine_motion_does_not_have():
+    scene = jacoflow.scenes.Scene("affine", width=80, height=60, u=0.5, v=0.2, random_state=1)
+    field = jacoflow.flow(*scene.frames(3), method=jacoflow.Instantaneous(model="accelerating", neighbourhood=(9, 9)))
+    for aggregate in ("inverse_variance", "median"):
+        value, std, count = field.region_mean("u_t", (10, 10, 40, 40), aggregate)
+        assert abs(value) < 4 * std and 0 < std < 0.1 and count > 1000
+    with pytest.raises(ValueError, match="^name: "):
+        field.measure("u_t")
+
+
+def test_a_measurement_comes_back_out_of_a_pickle(fan_field):
+    stack = jacoflow.estimate(list(fan()), fps=FPS)
+    for found in (fan_field.measure("rpm", DISC), stack.measure("curl", DISC, at=CENTRE)):
+        again = pickle.loads(pickle.dumps(found))
+        assert repr(again) == repr(found) and (again.quantity, again.unit, again.status) == (found.quantity, found.unit, found.status)
+        for name in ("value", "std", "share", "valid_share", "count", "motion", "covariance", "centre"):
+            np.testing.assert_array_equal(getattr(again, name), getattr(found, name))
+
+
+@pytest.mark.parametrize("region", [np.zeros((SIZE, SIZE), bool), [(1, 1), (9, 9), (20, 20)], [(300, 300), (310, 300), (310, 310)], (300.0, 300.0, 5.0)])
+def test_a_region_without_a_pixel_is_refused(fan_field, region):
+    for call in (fan_field.region_mean, fan_field.measure):
+        with pytest.raises(ValueError, match="^region: expected one that holds at least one site"):
+            call("curl", region)
+
+
+@pytest.mark.parametrize("at", [[80.0, 80.0], np.array(CENTRE), (np.float32(80), 80)])
+def test_the_pixel_may_be_any_pair(fan_field, at):
+    assert fan_field.measure("rpm", at=at).status == "ok"
+
+
+@pytest.mark.parametrize("at", ["x", (1, 2, 3), 5.0, [[1, 2]], ("a", 2)])
+def test_what_is_no_pixel_is_named(fan_field, at):
+    with pytest.raises((TypeError, ValueError), match="^at: expected"):
+        fan_field.measure("rpm", at=at)

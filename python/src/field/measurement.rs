@@ -25,6 +25,35 @@ struct Row {
     fit: RegionMotion,
 }
 
+/// A row as plain values: value and its standard deviation, motion and its covariance, centre, the numbers of
+/// sites, and the status.
+type Plain = ((f64, f64), ([f64; 6], [[f64; 6]; 6]), (f64, f64), [usize; 3], String);
+
+impl From<&Row> for Plain {
+    fn from(Row { value, std, fit }: &Row) -> Self {
+        let counts = [fit.count, fit.valid, fit.sites];
+        ((*value, *std), (fit.motion, fit.covariance), fit.centre, counts, fit.status.name().into())
+    }
+}
+
+impl TryFrom<Plain> for Row {
+    type Error = jacoflow::error::Error;
+
+    fn try_from(
+        ((value, std), (motion, covariance), centre, [count, valid, sites], status): Plain,
+    ) -> Result<Self, Self::Error> {
+        let status = RegionStatus::parse(&status)?;
+        Ok(Self { value, std, fit: RegionMotion { motion, covariance, centre, count, valid, sites, status } })
+    }
+}
+
+/// A measurement from what `Measurement.__reduce__` wrote.
+#[pyfunction(name = "_restore_measurement")]
+pub fn restore_measurement(name: String, unit: String, is_stack: bool, rows: Vec<Plain>) -> Outcome<Measurement> {
+    let rows = rows.into_iter().map(Row::try_from).collect::<Result<_, _>>()?;
+    Ok(Measurement { name, unit, is_stack, rows })
+}
+
 /// What is measured.
 pub enum Measured {
     /// A parameter of the motion, by its place among (u, v, u_x, v_x, u_y, v_y).
@@ -144,6 +173,13 @@ impl Measurement {
     fn centre<'py>(&self, py: Python<'py>) -> Outcome<Bound<'py, PyAny>> {
         let shape = if self.is_stack { vec![self.rows.len(), 2] } else { vec![2] };
         arrays::owned(py, &shape, self.rows.iter().flat_map(|row| [row.fit.centre.0, row.fit.centre.1]).collect())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Outcome<(Bound<'py, PyAny>, (String, String, bool, Vec<Plain>))> {
+        let this = slf.get();
+        let restore = slf.py().import("jacoflow._jacoflow")?.getattr("_restore_measurement")?;
+        let rows = this.rows.iter().map(Plain::from).collect();
+        Ok((restore, (this.name.clone(), this.unit.clone(), this.is_stack, rows)))
     }
 
     fn __repr__(&self) -> String {

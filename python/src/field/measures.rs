@@ -122,8 +122,8 @@ impl FlowField {
     /// is "no_dominant_motion" and the value NaN; with `at`, a pixel (x, y), that of the sites around it,
     /// however few they are. u and v are those at the region's centre. A site follows the motion where its
     /// flow differs by no more than its standard deviation and .1 px/frame explain at 99 %: motions that
-    /// differ by less are not separated, and `std` does not hold that. ValueError for
-    /// unknown names, a region or pixel outside the frame, and for a field without covariance.
+    /// differ by less are not separated, and `std` grows with what they leave. ValueError for unknown names,
+    /// a region without a site of the field, a pixel outside the frame, and for a field without covariance.
     ///
     /// >>> import jacoflow
     /// >>> scene = jacoflow.scenes.Scene("affine", width=96, height=64, u_x=0.01, v_y=0.01)
@@ -137,10 +137,11 @@ impl FlowField {
         py: Python<'_>,
         name: &str,
         region: Option<&Bound<'_, PyAny>>,
-        at: Option<(f64, f64)>,
+        at: Option<&Bound<'_, PyAny>>,
     ) -> Outcome<Measurement> {
         let (measured, unit) = (derived::measured(self.layout(), name)?, derived::unit(self.layout(), name)?);
         let region = region::parse(region)?;
+        let at = at.map(|at| arrays::pair("at", "a pixel (x, y)", at)).transpose()?;
         let mut measurement = Measurement::new(name, unit, self.stack);
         each!(self.store, packed => {
             for index in 0..self.count {

@@ -20,6 +20,7 @@ use std::sync::Arc;
 
 pub use derived::quantities;
 pub use measurement::Measurement;
+pub use measurement::restore_measurement;
 pub use packed::Packed;
 pub use state::{restore_field, status_names};
 

@@ -50,16 +50,21 @@ impl AffineMotion {
         site.flow - self.matrix * site.place()
     }
 
-    /// Squared distance of a site's flow from the motion, in units of its covariance and the deviation.
-    fn distance(&self, site: &Site) -> f64 {
+    /// Squared distance of a site's flow from the motion, in units of its covariance and a deviation.
+    fn distance(&self, site: &Site, deviation: f64) -> f64 {
         let residual = self.residual(site);
-        let covariance = site.covariance + SMatrix::identity() * (self.deviation * self.deviation);
+        let covariance = site.covariance + SMatrix::identity() * (deviation * deviation);
         covariance.try_inverse().map_or(f64::INFINITY, |inverse| residual.dot(&(inverse * residual)))
     }
 
     /// Whether a site follows the motion.
     pub(super) fn holds(&self, site: &Site) -> bool {
-        self.distance(site) < CHI2_LIMIT
+        self.distance(site, self.deviation) < CHI2_LIMIT
+    }
+
+    /// Whether a site may belong to the motion: it follows it, or differs by what is allowed at most.
+    pub(super) fn may_hold(&self, site: &Site) -> bool {
+        self.distance(site, MAX_DEVIATION) < CHI2_LIMIT
     }
 }
 
@@ -80,7 +85,9 @@ pub(super) fn dominant_motion(sites: &[Site], wanted: Option<usize>) -> Option<A
     // The motion around a site is judged by the sites near it.
     let judged = &compared[..drawn];
     let random = CounterRng::new(0);
-    let cost = |motion: &AffineMotion| judged.iter().map(|site| motion.distance(site).min(CHI2_LIMIT)).sum::<f64>();
+    let cost = |motion: &AffineMotion| {
+        judged.iter().map(|site| motion.distance(site, motion.deviation).min(CHI2_LIMIT)).sum::<f64>()
+    };
     let candidates = (0..CANDIDATES).filter_map(|k| {
         let three = random.stream(k).three(drawn).map(|index| judged[index]);
         let motion = fit(&three, MAX_DEVIATION)?;

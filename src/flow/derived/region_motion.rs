@@ -1,5 +1,6 @@
 //! One affine motion for a whole region, from the estimates of its sites.
 
+use super::common_residual::common_residual;
 use super::region::{carry_to, sites_in, valid_sites};
 use super::sharing::{in_common, sharing_among};
 use super::{
@@ -27,7 +28,7 @@ pub enum RegionStatus {
     TooFewSites,
 }
 
-choices!(RegionStatus: Ok "ok", NoDominantMotion "no_dominant_motion", TooFewSites "too_few_sites");
+choices!(RegionStatus, "status": Ok "ok", NoDominantMotion "no_dominant_motion", TooFewSites "too_few_sites");
 
 /// The motion of a region about its centre.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,7 +93,9 @@ pub fn measure_parameter(place: usize, fit: &RegionMotion) -> (f64, f64) {
 /// Estimates of neighbouring sites share pixels; the covariance is enlarged by [`sharing`](super::sharing()).
 /// Where the estimates scatter more than their covariances allow, it is enlarged by that ratio too (R. T.
 /// Birge, "The calculation of errors by the method of least squares", 1932). Where they scatter less, they
-/// have an error in common, which does not shrink with their number: the covariance holds it in full.
+/// have an error in common, which does not shrink with their number: the covariance holds it in full. What
+/// the residuals have in common over parts of the region (two motions that hardly differ, a flow that is not
+/// affine) does not shrink either; an analysis of variance finds it.
 ///
 /// # Errors
 /// [`Error::Argument`] naming `region` or `at` where they do not fit the frame, `covariance` for a field
@@ -157,7 +160,11 @@ pub fn fit_region<T: Real>(
     if !is_found {
         return Ok(RegionMotion { count, status: RegionStatus::NoDominantMotion, ..unknown });
     }
-    let Some((motion, covariance)) = least_squares(field, &followers, centre) else { return Ok(unknown) };
+    let Some((motion, mut covariance)) = least_squares(field, &followers, centre) else { return Ok(unknown) };
+    let near: Vec<usize> = sites.iter().filter(|site| dominant.may_hold(site)).map(|site| site.index).collect();
+    for (k, variance) in common_residual(field, &near, (centre, &motion), &floors(field)).into_iter().enumerate() {
+        covariance[k][k] += variance;
+    }
     Ok(RegionMotion { motion, covariance, count, status: RegionStatus::Ok, ..unknown })
 }
 
@@ -169,7 +176,7 @@ fn least_squares<T: Real>(
 ) -> Option<([f64; 6], [[f64; 6]; 6])> {
     let (dx, dy) = field.layout.units.pixel_pitch;
     let observed: Vec<usize> = observed_parameters(field);
-    let floor = MOTION_NAMES.map(|name| FLOOR * field.layout.units.scale(name).powi(2));
+    let floor = floors(field);
     let (mut normal, mut right, mut square, mut count) = (Matrix6::zeros(), Vector6::zeros(), 0.0, 0);
     // Sums of the weights, and of what they make of an error that all sites have in common.
     let mut weights = DMatrix::zeros(observed.len(), observed.len());
@@ -202,6 +209,11 @@ fn least_squares<T: Real>(
         covariance += Matrix6::from_fn(|i, j| whole[(i, j)]);
     }
     Some((motion.into(), covariance.transpose().into()))
+}
+
+/// Variances added to those of the estimates, in the units of the field.
+fn floors<T>(field: &FlowField<T>) -> [f64; 6] {
+    MOTION_NAMES.map(|name| FLOOR * field.layout.units.scale(name).powi(2))
 }
 
 /// Which of the six parameters the model estimates.
