@@ -64,6 +64,8 @@ RECORDED_MATCHERS = {
     "OpenCV BM 15": "OpenCV BM",
 }
 LIMITS = "Limits of a step"
+TWO_MOTIONS = "Two motions in a region"
+NOISE = "Noise of a pair"
 HARD = "Tracking, 28 hard scenes, share of frames found / median error of the centre in px"
 SCENES = "Particle tracker, ten scenes"
 CHANCE = "3-D motion: what is said of scenes by chance"
@@ -120,6 +122,21 @@ def limits(record: Record) -> list[str]:
     names |= {rival: rival for rival in ("OpenCV DIS medium", "OpenCV Farneback")}
     body = [[str(row["step"]), *(number(row.get(name), 3) for name in names)] for row in record.sections[LIMITS]]
     return lines(["median error, px", *names.values()], body)
+
+
+def two_motions(record: Record) -> list[str]:
+    """What `measure` says of a region of two motions, by their difference."""
+    names = {"no dominant motion": "no dominant motion", "u, px": "u off by, px", "std of u": "std"}
+    names |= {"u_x": "u_x off by", "std of u_x": "std"}
+    body = [[number(row["difference, px"], 1), *(number(row.get(name), 4) for name in names)] for row in record.sections[TWO_MOTIONS]]
+    return lines(["difference, px", *names.values()], body)
+
+
+def noise(record: Record) -> list[str]:
+    """Errors and stated errors of the means of a pair, by the noise."""
+    names = ("error of u", "std of u", "error of divergence", "std of divergence")
+    body = [[number(row["noise, grey levels"], 0), *(number(row.get(name), 3) for name in names)] for row in record.sections[NOISE]]
+    return lines(["noise, grey levels", *names], body)
 
 
 def _both(row: dict[str, object], first: str, digits: int, second: str, more: int) -> str:
@@ -274,6 +291,8 @@ TABLES: dict[str, tuple[Callable[[Record], list[str]], tuple[str, ...]]] = {
     "stereo_tracking": (stereo_tracking, tuple(f"Stereo tracking, {scene}" for scene in STEREO_SCENES)),
     "motion": (motion, (CHANCE, VIEWS)),
     "limits": (limits, (LIMITS,)),
+    "two_motions": (two_motions, (TWO_MOTIONS,)),
+    "noise": (noise, (NOISE,)),
     "parts": (parts, (FILTER, "Weighted mixtures, a round")),
 }
 """Table of a document -> its maker, and sections of the results that it needs."""

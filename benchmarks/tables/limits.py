@@ -1,4 +1,5 @@
-"""How far a step from frame to frame may go: turns, enlargements and shifts of a texture, beside OpenCV.
+"""How far a step from frame to frame may go, beside OpenCV; how close two motions in a region may be, and how much
+noise there may be.
 
     python -m benchmarks.tables.limits [--quick]
 """
@@ -16,7 +17,10 @@ from benchmarks.scenes import steps
 
 Row = dict[str, object]
 TURNS, ENLARGEMENTS, SHIFTS = (5, 10, 15, 20, 30), (1.05, 1.1, 1.2, 1.3, 1.5), (8, 16, 32, 48, 64)
+DIFFERENCES, NOISES, FRACTIONS = (0.1, 0.2, 0.3, 0.5, 1.0), (0.0, 1.0, 2.0, 4.0, 8.0, 16.0), (0.25, 0.37, 0.8)
 SEEDS = (0, 1, 2)
+SQUARE = (40, 40, 81, 81)
+"""The region that is measured."""
 MARGIN = 24
 """Pixels at the edges that are left out."""
 
@@ -60,8 +64,61 @@ def limits(seeds: tuple[int, ...]) -> list[Row]:
     return rows
 
 
+def eight_bit(frame: NDArray[np.float64], noise: float, rng: np.random.Generator) -> NDArray[np.uint8]:
+    """A frame as a camera gives it, with white noise of `noise` grey levels."""
+    return np.asarray(np.clip(np.rint(frame + rng.normal(0, noise, frame.shape)), 0, 255), dtype=np.uint8)
+
+
+def two_motions(seeds: tuple[int, ...]) -> list[Row]:
+    """`measure` of a square of which one half moves by `difference` px and the other stands still: distance of
+    (u, u_x) from the nearer motion, with the stated standard deviations, root mean squares."""
+    rows: list[Row] = []
+    for difference in DIFFERENCES:
+        found = []
+        for seed in seeds:
+            picture, rng = steps.texture(seed), np.random.default_rng(seed)
+            still, gone = (steps.moved(picture, np.eye(2), (shift, 0.0)) for shift in (0.0, difference))
+            right = np.arange(steps.SIZE)[None, :] > steps.CENTRE[0]
+            frames = [eight_bit(frame, 1.0, rng) for frame in (still, np.where(right, gone, still))]
+            found.append(jacoflow.flow(*frames).measure("u", SQUARE))
+        known = [each for each in found if each.status == "ok"]
+        row: Row = {"difference, px": difference, "no dominant motion": 1 - len(known) / len(found)}
+        if known:
+            u = [min(abs(each.value), abs(each.value - difference)) for each in known]
+            u_x = [each.motion[2] for each in known]
+            row["u, px"], row["std of u"] = _rms(u), _rms([each.std for each in known])
+            row["u_x"], row["std of u_x"] = _rms(u_x), _rms([float(np.sqrt(each.covariance[2, 2])) for each in known])
+        rows.append(row)
+    return rows
+
+
+def noise(seeds: tuple[int, ...]) -> list[Row]:
+    """Means over a square of a texture that moves by a fraction of a pixel and grows by a hundredth, from a pair:
+    errors of u and of the divergence as shares of the truth, with the stated ones, root mean squares."""
+    rows: list[Row] = []
+    for level in NOISES:
+        found: dict[str, list[float]] = {}
+        for seed in seeds:
+            picture, rng = steps.texture(seed), np.random.default_rng(seed)
+            for shift in FRACTIONS:
+                for name, true, matrix in (("u", shift, np.eye(2)), ("divergence", 2 * np.log(1.01), 1.01 * np.eye(2))):
+                    moved = [steps.moved(picture, np.eye(2)), steps.moved(picture, matrix, (shift, 0.0))]
+                    field = jacoflow.flow(*(eight_bit(frame, level, rng) for frame in moved))
+                    value, std, _ = field.region_mean(name, SQUARE)
+                    found.setdefault(f"error of {name}", []).append(value / true - 1)
+                    found.setdefault(f"std of {name}", []).append(std / true)
+        rows.append({"noise, grey levels": level} | {name: _rms(values) for name, values in found.items()})
+    return rows
+
+
+def _rms(values: list[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
 TABLES = {
     "limits": report.Table("Limits of a step", lambda o: limits(SEEDS[: 1 if o.quick else len(SEEDS)])),
+    "two_motions": report.Table("Two motions in a region", lambda o: two_motions(SEEDS[: 1 if o.quick else len(SEEDS)])),
+    "noise": report.Table("Noise of a pair", lambda o: noise(SEEDS[: 1 if o.quick else len(SEEDS)])),
 }
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ __all__ = [
     "Measurement",
     "quantities",
     "_restore_field",
+    "_restore_measurement",
     "_status_names",
     "ExtendedKalmanFilter",
     "GaussianFilter",
@@ -285,7 +286,7 @@ class FlowField:
         covariance.
         """
     def measure(
-        self, /, name: str, region: ArrayLike | None = None, *, at: tuple[float, float] | None = None
+        self, /, name: str, region: ArrayLike | None = None, *, at: ArrayLike | None = None
     ) -> Measurement:
         """The parameter or derived quantity `name` of the one affine motion that a region follows, as
         `Measurement`; for a stack at each time.
@@ -294,8 +295,8 @@ class FlowField:
         is "no_dominant_motion" and the value NaN; with `at`, a pixel (x, y), that of the sites around it,
         however few they are. u and v are those at the region's centre. A site follows the motion where its
         flow differs by no more than its standard deviation and .1 px/frame explain at 99 %: motions that
-        differ by less are not separated, and `std` does not hold that. ValueError for
-        unknown names, a region or pixel outside the frame, and for a field without covariance.
+        differ by less are not separated, and `std` grows with what they leave. ValueError for unknown names,
+        a region without a site of the field, a pixel outside the frame, and for a field without covariance.
 
         >>> import jacoflow
         >>> scene = jacoflow.scenes.Scene("affine", width=96, height=64, u_x=0.01, v_y=0.01)
@@ -388,14 +389,20 @@ class FlowField:
         """
     @staticmethod
     def from_arrays(
-        flow: ArrayLike, covariance: ArrayLike | None = None, jacobian: ArrayLike | None = None
+        flow: ArrayLike,
+        covariance: ArrayLike | None = None,
+        jacobian: ArrayLike | None = None,
+        *,
+        interval: Literal["forward", "central", "instant"] | None = None,
     ) -> FlowField:
         """The field of flow from elsewhere, px/frame: `std`, `advect`, `region_mean` and motion from flow then
         work on it: (u, v) of shape (H, W, 2), their Jacobian (H, W, 2, 2), [[u_x, u_y], [v_x, v_y]], and the
         covariance of (u, v), (H, W, 2, 2), or with a Jacobian of (u, v, u_x, v_x, u_y, v_y), (H, W, 6, 6).
 
-        NaN where the flow is unknown. Without a Jacobian derivatives are zero. ValueError for other shapes
-        and negative variances.
+        NaN where the flow is unknown. Without a Jacobian derivatives are zero. `interval` is the time over
+        which the flow is taken: "forward" (default), from the field's frame to the next, "central", half the
+        displacement from the frame before to the one after, or "instant", the velocity. ValueError for other
+        shapes or names, negative variances and covariances with a negative eigenvalue.
         """
     @staticmethod
     def load(path: _Path) -> FlowField:
@@ -654,10 +661,19 @@ class FlowFilter:
     def push(self, /, frame: _Frame) -> FlowField:
         """Takes in the next frame (H, W) and returns the FlowField after it, px/frame.
 
-        Where a neighbourhood holds NaN the filter only predicts, and the result is NaN with status
-        NON_FINITE. Where the frame contradicts the prediction (black, flashed, dropped) the motion is that of
-        the frames before, with status PREDICTED. ValueError for a frame of another size, TypeError for
-        another dtype; the filter is then unchanged.
+        Where a neighbourhood holds NaN or a masked pixel the filter only predicts, and the result is NaN with
+        status NON_FINITE. Where the frame contradicts the prediction (black, flashed, dropped) the motion is
+        that of the frames before, with status PREDICTED. ValueError for a frame of another size, and for masked
+        uint16 frames without `full_scale`; TypeError for another dtype; the filter is then unchanged.
+        """
+    def smooth(self, /, frames: _Frames) -> FlowField:
+        """The fields of all `frames` (T, H, W), a stack of T, each from the frames before and after it.
+
+        A two-filter smoother (Fraser and Potter, 1969): two filters with these options run through the frames,
+        one of them backwards, and are joined at each frame. No lag, and at most the variance of the filter.
+        Where a frame is missing the motion is that of the frames around it, with status PREDICTED. The filter
+        itself stays as it is. All frames and fields are held in memory. Ctrl-C stops it. ValueError for frames
+        of different sizes, TypeError for different dtypes.
         """
     def reset(self, /) -> None:
         """Forgets every frame (H, W): the next one starts new filters."""
@@ -1671,6 +1687,7 @@ def _write_pfm(path: _Path, values: ArrayLike) -> None: ...
 def _restore_estimator(options: dict[str, Any], memory: dict[str, Any]) -> FlowEstimator: ...
 def _restore_extended(state: dict[str, Any]) -> ExtendedKalmanFilter: ...
 def _restore_field(state: dict[str, Any]) -> FlowField: ...
+def _restore_measurement(name: str, unit: str, is_stack: bool, rows: list[Any]) -> Measurement: ...
 def _restore_filter(options: dict[str, Any], state: tuple[bytes, str] | None) -> FlowFilter: ...
 def _restore_particle(state: dict[str, Any]) -> ParticleFilter: ...
 def _restore_kalman(state: dict[str, Any]) -> KalmanFilter: ...

@@ -83,8 +83,8 @@ class PointMixture(_Base):
                 _demand(name, parameters[name], numbers.Real, "a number or None")
         if self.threads is not None:
             _demand("threads", self.threads, numbers.Integral, "an integer or None")
-            if self.threads < 1:
-                raise ValueError(f"threads: expected a positive integer, got {self.threads}")
+            if not 1 <= self.threads < 2**31:
+                raise ValueError(f"threads: expected an integer from 1 to 2^31 - 1, got {self.threads}")
         for name, words in self._WORDS.items():
             _demand(name, parameters[name], str, words)
         for name in self._SWITCHES:

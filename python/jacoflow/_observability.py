@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._brief import Brief
+from ._checks import numbers
 from ._jacoflow import _classify, _observability
 from ._options import Preprocess
 
@@ -109,6 +110,6 @@ def classify(jet: ArrayLike, motion: ArrayLike) -> Observability:
     6
     """
     condition, rank_single, rank, condition_number = _classify(
-        np.asarray(jet, dtype=np.float64).tolist(), np.asarray(motion, dtype=np.float64).tolist()
+        numbers("jet", jet, "(I, Ix, Iy, Ixx, Ixy, Iyy)", (6,)).tolist(), numbers("motion", motion, "(u, v, u_x, v_x, u_y, v_y)", (6,)).tolist()
     )
     return Observability(Condition(condition), rank_single, rank, condition_number)

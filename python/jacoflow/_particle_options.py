@@ -7,9 +7,9 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ._stereo_options import real_number
+from ._checks import numbers, real_number
 
 MOST_ID = 2**63 - 2
 """Greatest number of a target, no unit."""
@@ -99,12 +99,12 @@ def checked_id(value: Any) -> int:
 
 def checked_box(name: str, value: ArrayLike) -> list[float]:
     """Left, top, width and height, px."""
-    return _numbers(name, value, "(left, top, width, height), px", (4,)).tolist()  # type: ignore[no-any-return]
+    return numbers(name, value, "(left, top, width, height), px", (4,)).tolist()  # type: ignore[no-any-return]
 
 
 def checked_camera(value: ArrayLike | None) -> list[list[float]] | None:
     """An affine motion (2, 3) of the background, px; None: not known."""
-    return None if value is None else _numbers("camera", value, "an affine map (2, 3), px", (2, 3)).tolist()
+    return None if value is None else numbers("camera", value, "an affine map (2, 3), px", (2, 3)).tolist()
 
 
 def checked_boxes(value: Any) -> list[tuple[int, list[float]]]:
@@ -118,18 +118,7 @@ def checked_boxes(value: Any) -> list[tuple[int, list[float]]]:
         empty = False
     if empty:
         return []
-    array = _numbers("boxes", value, "an array (K, 4) of left, top, width, height, px, or a dict id -> box", (None, 4))
+    array = numbers("boxes", value, "an array (K, 4) of left, top, width, height, px, or a dict id -> box", (None, 4))
     return [(number, box.tolist()) for number, box in enumerate(array)]
 
 
-def _numbers(name: str, value: Any, expected: str, shape: tuple[int | None, ...]) -> NDArray[np.float64]:
-    """Real numbers, in their unit, as an array of a shape in which None is any length."""
-    try:
-        array = np.asarray(value)
-    except ValueError:
-        array = np.asarray(None)
-    if array.dtype.kind not in "iuf":
-        raise ValueError(f"{name}: expected {expected}, got {value!r}")
-    if len(array.shape) != len(shape) or any(length not in (None, got) for length, got in zip(shape, array.shape, strict=True)):
-        raise ValueError(f"{name}: expected {expected}, got shape {array.shape}")
-    return array.astype(np.float64)

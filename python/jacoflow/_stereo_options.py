@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import operator
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import astuple, dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+from ._checks import converted, real_number
 
 COUNTS = ("n_components", "random_state", "search", "threads")
 """Counts, no unit; None where the default depends on the mode."""
@@ -117,15 +119,9 @@ def _switch(name: str, value: Any, expected: str) -> bool:
     return bool(value)
 
 
-def real_number(name: str, value: Any) -> float:
-    """A number, in its unit; TypeError by name for what is none."""
-    number: float = _converted(name, value, float, "a number")
-    return number
-
-
 def whole_number(name: str, value: Any) -> int:
     """An integer, in its unit, that the compiled part can hold; TypeError or ValueError by name for what is none."""
-    integer: int = _converted(name, value, operator.index, "an integer")
+    integer: int = converted(name, value, operator.index, "an integer")
     most = MOST.get(name, MOST_ELSE)
     if abs(integer) > most:
         raise ValueError(f"{name}: expected an integer up to {most}, got {integer}")
@@ -151,17 +147,9 @@ def _count(name: str, value: Any) -> int | None:
 
 def _several(name: str, value: Any, length: int, *, whole: bool) -> tuple[Any, ...]:
     """A sequence of so many numbers, in its unit; the last of `grid` may be None."""
-    numbers = _converted(name, value, tuple, f"{length} numbers")
-    if len(numbers) != length:
-        raise ValueError(f"{name}: expected {length} numbers, got {len(numbers)}")
+    expected = f"{length} numbers"
+    if converted(name, value, len, expected) != length:
+        raise ValueError(f"{name}: expected {expected}, got {len(value)}")
+    numbers = converted(name, value, tuple, expected)
     convert = whole_number if whole else real_number
     return tuple(None if number is None and name == "grid" and at == 2 else convert(name, number) for at, number in enumerate(numbers))
-
-
-def _converted(name: str, value: Any, convert: Callable[[Any], Any], expected: str) -> Any:
-    try:
-        if isinstance(value, (str, bytes)):
-            raise TypeError
-        return convert(value)
-    except (TypeError, OverflowError):
-        raise TypeError(f"{name}: expected {expected}, got {value!r}") from None

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._checks import numbers, real_number
 from ._figures import axes_or_new, check_parts, colour_map, frame_extent
 
 if TYPE_CHECKING:
@@ -32,8 +33,8 @@ def identity_colours(numbers: ArrayLike) -> NDArray[np.float64]:
 def disparity(found: EdgeDisparity, *, left: ArrayLike | None = None, axes: Axes | None = None, limits: tuple[float, float] | None = None) -> Axes:
     """Draws the N edge pixels of an `EdgeDisparity` coloured by disparity, px, over `left`, a grey array (H, W), if given; `limits` (least, greatest), px, of the colours."""
     check_parts("found", found, "EdgeDisparity", ("disparity", "rows", "cols", "values"))
-    if limits is not None and np.shape(limits) != (2,):
-        raise ValueError(f"limits: expected two numbers, least and greatest, got {limits!r}")
+    if limits is not None:
+        limits = tuple(numbers("limits", limits, "two numbers, least and greatest", (2,)))
     axes = axes_or_new(axes)
     _background(axes, left, found.disparity.shape)
     if limits is None:
@@ -53,6 +54,7 @@ def clusters(step: StereoStep, *, left: ArrayLike | None = None, axes: Axes | No
     check_parts("step", step, "StereoStep", ("rows", "cols", "clusters", "cluster_of_pixel"))
     if by not in ("track", "group"):
         raise ValueError(f'by: expected "track" or "group", got {by!r}')
+    arrows = real_number("arrows", arrows)
     axes = axes_or_new(axes)
     shape = (int(max(step.rows, default=0)) + 1, int(max(step.cols, default=0)) + 1)
     _background(axes, left, shape)
@@ -73,6 +75,7 @@ def track_graph(graph: TrackGraph, *, axes: Axes | None = None, threshold: float
     """Draws a `TrackGraph` over time: steps to the right, a row for each component (no unit); nodes in the colour of their track, as large as their number of pixels; arcs with a score of
     at least `threshold` (0 to 2), as thick as their score."""
     check_parts("graph", graph, "TrackGraph", ("nodes", "arcs"))
+    threshold = real_number("threshold", threshold)
     axes = axes_or_new(axes)
     nodes = graph.nodes
     for ((t0, k0), (t1, k1)), (forward, backward) in graph.arcs.items():
@@ -93,7 +96,7 @@ def track_graph(graph: TrackGraph, *, axes: Axes | None = None, threshold: float
 
 def _background(axes: Axes, left: ArrayLike | None, shape: tuple[int, ...]) -> None:
     """The view in grey, darkened so that colours stand out; black without one."""
-    image = np.zeros(shape) if left is None else np.asarray(left, float)
+    image = np.zeros(shape) if left is None else numbers("left", left, "a view (H, W) or (H, W, 3)")
     if image.ndim == 3:
         image = image[..., :3] @ np.array([0.299, 0.587, 0.114])
     if image.ndim != 2:

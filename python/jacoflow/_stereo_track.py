@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._brief import Brief, Rows
+from ._checks import real_number
 from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
-from ._stereo_options import StereoCamera, as_array, checked, checked_views, real_number, warn_of_rows, whole_number
+from ._stereo_options import StereoCamera, as_array, checked, checked_views, warn_of_rows, whole_number
 
 if TYPE_CHECKING:
     import networkx as _networkx  # type: ignore[import-untyped, unused-ignore]

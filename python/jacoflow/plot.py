@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ._checks import numbers, positive_integer, positive_number, real_number
 from ._figures import axes_or_new, colour_map, frame_extent, pyplot_or_error
 from ._jacoflow import FlowField
 from ._stereo_plot import clusters, disparity, track_graph
@@ -68,7 +69,8 @@ def flow_image(field: FieldLike, *, max_speed: float | None = None) -> NDArray[n
 def wheel_image(size: int = 96) -> NDArray[np.uint8]:
     """The key to `flow_image`, uint8 array (size, size, 3), size in px: the colour at an offset from the
     middle is that of flow in that direction."""
-    offsets = (np.arange(size) - (size - 1) / 2) / max(size / 2, 1)
+    size = positive_integer("size", size)
+    offsets = (np.arange(size) - (size - 1) / 2) / (size / 2)
     v, u = np.meshgrid(offsets, offsets, indexing="ij")
     image = _colours(u, v, 1.0)
     image[np.hypot(u, v) > 1] = 255
@@ -114,13 +116,14 @@ def quiver(
         axes.imshow(np.asarray(frame), cmap="gray", interpolation="nearest")
     if flow.ndim == 3:
         step = max(1, round(max(flow.shape[:2]) / 24)) if step is None else step
-        if step < 1:
-            raise ValueError(f"step: expected a positive integer, got {step}")
+        step = positive_integer("step", step)
         part = (slice(step // 2, None, step), slice(step // 2, None, step))
         x, y, flow = x[part], y[part], flow[part]
     known = np.isfinite(flow).all(axis=-1)
     x, y, flow = x[known], y[known], flow[known]
-    if scale is None:
+    if scale is not None:
+        scale = real_number("scale", scale)
+    else:
         longest = np.percentile(np.hypot(flow[:, 0], flow[:, 1]), 98) if len(flow) else 0.0
         distance = _spacing(x, y)
         scale = float(distance / longest) if longest > 0 else 1.0
@@ -150,14 +153,13 @@ def scalar_map(
     values. `field` places the plane in the image when it has a region or stride. `label` and `unit` are words
     for the title and the bar.
     """
-    values = np.asarray(values, dtype=float)
-    if values.ndim != 2:
-        raise ValueError(f"values: expected an array (H, W), got shape {values.shape}")
+    given = np.asarray(values)
+    values = numbers("values", given.astype(float) if given.dtype == bool else given, "an array (H, W)", (None, None))
     axes = axes_or_new(axes)
     finite = np.abs(values[np.isfinite(values)])
     if limit is None:
-        limit = float(np.percentile(finite, 98)) if finite.size else 1.0
-    limit = limit if limit > 0 else 1.0
+        limit = (float(np.percentile(finite, 98)) if finite.size else 0.0) or 1.0
+    limit = positive_number("limit", limit)
     extent = _extent(field, values.shape) if field is not None else frame_extent(values.shape)
     shown = axes.imshow(values, cmap=colour_map(signed), vmin=-limit if signed else 0.0, vmax=limit, extent=extent, interpolation="nearest")
     bar = axes.get_figure(root=True).colorbar(shown, ax=axes, shrink=0.8)  # type: ignore[union-attr]
@@ -208,7 +210,7 @@ def _part(field: FieldLike, name: str) -> NDArray[np.float64]:
     array = getattr(field, name, None)
     if array is None:
         raise TypeError(f"field: expected a FlowField, or another object with `{name}`, got {type(field).__name__}")
-    return np.asarray(array, dtype=float)
+    return numbers(f"field.{name}", array, "an array of numbers")
 
 
 def _flow(field: FieldLike) -> NDArray[np.float64]:
@@ -228,9 +230,7 @@ def _jacobian(field: FieldLike) -> NDArray[np.float64]:
 def _full_speed(flow: NDArray[np.float64], max_speed: float | None) -> float:
     """The speed of full saturation, px/frame."""
     if max_speed is not None:
-        if not max_speed > 0:
-            raise ValueError(f"max_speed: expected a positive number of px/frame, got {max_speed}")
-        return float(max_speed)
+        return positive_number("max_speed", max_speed)
     speeds = np.hypot(flow[..., 0], flow[..., 1])
     speeds = speeds[np.isfinite(speeds)]
     full = float(np.percentile(speeds, 99)) if speeds.size else 1.0

@@ -28,10 +28,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._brief import Brief, columns
+from ._checks import numbers, real_number
 from ._jacoflow import _detect_moving_target, _GaussMarkovFilter, _GradientTracker
 from ._particle_track import ParticleCorners, ParticleStep, ParticleTracker
 from ._particle_tracks import ParticleTrack, ParticleTracks, track_particles
-from ._stereo_options import StereoCamera, real_number
+from ._stereo_options import StereoCamera
 from ._stereo_track import StereoCluster, StereoStep, StereoTrack, StereoTracker, TrackGraph
 
 __all__ = [
@@ -243,20 +244,10 @@ def _numbers(name: str, value: ArrayLike | None, expected: str, count: int) -> l
 
 def _needed(name: str, value: ArrayLike | None, expected: str, count: int) -> list[float]:
     """A short list of numbers that must be there."""
-    try:
-        array = None if value is None else np.asarray(value, float)
-    except (TypeError, ValueError):
-        array = None
-    if array is None or _holds_switches(value):
+    checked: list[float] = numbers(name, value, expected, (count,)).tolist()
+    if any(isinstance(each, _SWITCHES) for each in np.asarray(value, object)):
         raise ValueError(f"{name}: expected {expected}, got {value!r}")
-    if array.shape != (count,):
-        raise ValueError(f"{name}: expected {expected}, got shape {array.shape}")
-    return [float(number) for number in array]
-
-
-def _holds_switches(value: Any) -> bool:
-    """Whether True or False is among the numbers."""
-    return any(isinstance(each, _SWITCHES) for each in np.asarray(value, object).ravel())
+    return checked
 
 
 def track(frames: Iterable[ArrayLike], bbox: ArrayLike | None = None, **options: Any) -> Track:

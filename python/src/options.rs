@@ -57,7 +57,7 @@ impl<T: Number> Number for Option<T> {
     const RANGE: &str = T::RANGE;
 }
 
-/// The argument called `name`: a number that its type does not hold is refused by name.
+/// The argument called `name`: what is no number, or one that its type does not hold, is refused by name.
 fn number<'py, T: Number + FromPyObjectOwned<'py>>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<T> {
     value.extract::<T>().map_err(|error| {
         let error: PyErr = error.into();
@@ -65,6 +65,9 @@ fn number<'py, T: Number + FromPyObjectOwned<'py>>(name: &str, value: &Bound<'py
             let words = value.str().map_or_else(|_| "a larger one".into(), |text| text.to_string());
             let got: String = words.chars().take(MAX_DIGITS).collect();
             return PyValueError::new_err(format!("{name}: expected {}, got {got}", T::RANGE));
+        }
+        if error.is_instance_of::<PyTypeError>(value.py()) {
+            return PyTypeError::new_err(format!("{name}: expected {}, got {}", T::RANGE, arrays::kind_of(value)));
         }
         error
     })
@@ -273,12 +276,15 @@ pub fn units(py: Python<'_>, pitch: &Object, length: Option<&str>, fps: &Object)
             }
         };
     };
-    let value = value.bind(py);
-    let side = || value.extract::<f64>().map(|side| (side, side));
-    let pair = value.extract::<(f64, f64)>().or_else(|_| side()).map_err(|_| {
-        PyTypeError::new_err(format!("pixel_pitch: expected a length or (dx, dy), got {}", value.get_type()))
-    })?;
-    Ok(Units::new(pair, length, period))
+    let pitch = match arrays::doubles("pixel_pitch", value.bind(py))?.1[..] {
+        [side] => (side, side),
+        [dx, dy] => (dx, dy),
+        ref more => {
+            let got = format!("{} numbers", more.len());
+            return Err(Error::argument("pixel_pitch", "a length or (dx, dy)", got).into());
+        }
+    };
+    Ok(Units::new(pitch, length, period))
 }
 
 /// `precision=None | "float32" | "float64"`.

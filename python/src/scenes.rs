@@ -129,13 +129,13 @@ impl Scene {
     ) -> Outcome<FlowField> {
         let threads = Threads::new(None)?;
         let scene = self.core.as_ref();
-        let field = py.detach(|| {
+        let field = interruptible(py, || {
             threads.install(|| match between {
                 None => truth(scene, t),
                 Some(between) => mean_truth(scene, t, between),
             })
-        });
-        Ok(FlowField::single(field?))
+        })?;
+        Ok(FlowField::single(field))
     }
 
     /// Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame,

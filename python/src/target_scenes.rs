@@ -2,6 +2,7 @@
 
 use super::{arrays, options::Integer, options::named, scenes::hash};
 use crate::errors::Outcome;
+use crate::interrupt::interruptible;
 use crate::keywords::getters;
 use jacoflow::error::Error;
 use jacoflow::parallel::Threads;
@@ -84,7 +85,7 @@ impl TargetScene {
         let options =
             TargetSceneOptions { random_state, scale, noise, frames: frames.map(count).transpose()?, colour_cast };
         let threads = Threads::new(None)?;
-        let core = py.detach(|| threads.install(|| CoreScene::new(name, options)))?;
+        let core = interruptible(py, || threads.install(|| CoreScene::new(name, options)))?;
         Ok(Self { core })
     }
 
@@ -105,7 +106,7 @@ impl TargetScene {
         targets: Option<Bound<'py, PyAny>>,
     ) -> Outcome<Bound<'py, PyAny>> {
         let (t, drawn, threads) = (self.index(t)?, self.drawn(targets)?, Threads::new(None)?);
-        let frame = py.detach(|| threads.install(|| self.core.frame_with(t, |target| drawn[target])));
+        let frame = interruptible(py, || Ok(threads.install(|| self.core.frame_with(t, |target| drawn[target]))))?;
         let (width, height) = frame.size();
         arrays::owned(py, &[height, width, 3], frame.into_data().into_flattened())
     }
@@ -121,8 +122,7 @@ impl TargetScene {
         }
         let threads = Threads::new(None)?;
         for t in 0..count {
-            py.check_signals()?;
-            let frame = py.detach(|| threads.install(|| self.core.frame(t)));
+            let frame = interruptible(py, || Ok(threads.install(|| self.core.frame(t))))?;
             data.extend_from_slice(frame.data().as_flattened());
         }
         arrays::owned(py, &[count, height, width, 3], data)

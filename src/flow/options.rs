@@ -28,11 +28,14 @@ pub struct InitialFlow {
 }
 
 impl InitialFlow {
-    /// From row-major planes of a frame of `size = (width, height)`.
+    /// From row-major planes of a frame of `size = (width, height)`; NaN where it is unknown.
     ///
     /// # Errors
-    /// [`Error::Argument`] for planes of another size.
+    /// [`Error::Argument`] for planes of another size, and naming `initial` for an infinite value.
     pub fn new((width, height): (usize, usize), u: &[f32], v: &[f32]) -> Result<Self> {
+        if let Some(value) = u.iter().chain(v).find(|value| value.is_infinite()) {
+            return Err(Error::argument("initial", "a finite flow, px/frame, or NaN where it is unknown", value));
+        }
         let frame = |plane: &[f32]| Frame::new(width, height, plane.to_vec());
         Ok(Self { u: frame(u)?, v: frame(v)? })
     }

@@ -2,7 +2,7 @@
 
 use super::{AffineFlow, Interval, MOTION_NAMES, SamplingGrid, Status, Units};
 use crate::error::{Error, Result, check_memory};
-use crate::math::Real;
+use crate::math::{Real, dense::cholesky};
 use std::borrow::Cow;
 
 /// What a field holds at each site and where the sites are.
@@ -59,14 +59,42 @@ pub struct FlowField<T> {
     pub window: Option<Vec<T>>,
 }
 
+/// Least eigenvalue of correlations that single precision may leave below zero.
+const ROUNDING: f64 = 1e-5;
+
+/// Whether the covariance at a site of `n`, out of planes of the upper triangle, has a negative eigenvalue
+/// beyond rounding; not known, no.
+fn is_indefinite<T: Real>(planes: &[T], (site, n): (usize, usize), p: usize) -> bool {
+    let mut matrix = vec![0.0; p * p];
+    let upper = (0..p).flat_map(|i| (i..p).map(move |j| (i, j)));
+    for (plane, (i, j)) in upper.enumerate() {
+        let value = planes[plane * n + site].to_f64();
+        (matrix[i * p + j], matrix[j * p + i]) = (value, value);
+    }
+    let deviation: Vec<f64> = (0..p).map(|k| matrix[k * (p + 1)].sqrt()).collect();
+    if !matrix.iter().all(|value| value.is_finite()) {
+        return false;
+    }
+    for i in 0..p {
+        for j in 0..p {
+            let unit = deviation[i] * deviation[j];
+            let raised = if i == j { ROUNDING } else { 0.0 };
+            // A component without variance has no covariance.
+            let value = &mut matrix[i * p + j];
+            *value = raised + if unit > 0.0 { *value / unit } else { value.abs() * f64::MAX };
+        }
+    }
+    !cholesky(&matrix, p, &mut vec![0.0; p * p])
+}
+
 impl<T: Real> FlowField<T> {
     /// A field at every pixel of a frame of `size = (width, height)` from given planes: `u, v`, or all of
     /// `MOTION_NAMES`, and the upper triangle of their covariance, in px and frames. Status `Unobservable`
     /// where a plane is not finite.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `motion` or `covariance` for another number of values, or a negative
-    /// variance.
+    /// [`Error::Argument`] naming `motion` or `covariance` for another number of values, a negative variance,
+    /// or correlations with a negative eigenvalue.
     pub fn from_planes(size: (usize, usize), motion: Vec<T>, covariance: Option<Vec<T>>) -> Result<Self> {
         let (n, count) = (size.0 * size.1, motion.len());
         let (model, p) = if count == 2 * n { ("translational", 2) } else { ("affine", MOTION_NAMES.len()) };
@@ -94,6 +122,10 @@ impl<T: Real> FlowField<T> {
                 let expected = format!("{entries} values, variances of at least 0");
                 let got = if found == entries { "a negative variance".into() } else { format!("{found} values") };
                 return Err(Error::argument("covariance", expected, got));
+            }
+            if let Some(site) = (0..n).find(|&site| is_indefinite(planes, (site, n), p)) {
+                let got = format!("an indefinite matrix at pixel ({}, {})", site % size.0, site / size.0);
+                return Err(Error::argument("covariance", "positive semi-definite matrices", got));
             }
         }
         let is_known = |site: usize| (0..p).all(|k| motion[k * n + site].finite());

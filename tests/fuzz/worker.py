@@ -26,8 +26,9 @@ def prepare():
 
 
 def is_named(error, names):
-    """Whether a message names one of the arguments."""
-    return any(match["name"] in names for match in PLACES.finditer(str(error)))
+    """Whether a message, or what was noted with it, names one of the arguments."""
+    text = "\n".join([str(error), *getattr(error, "__notes__", ())])
+    return any(match["name"] in names for match in PLACES.finditer(text))
 
 
 def judge(call, names):

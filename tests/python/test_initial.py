@@ -156,6 +156,28 @@ def test_arrays_that_do_not_fit_are_refused_by_name():
         make(flow, np.zeros((60, 80, 2, 2)), jacobian)
     with pytest.raises(ValueError, match="covariance: .*negative variance"):
         make(flow, np.broadcast_to(-np.eye(2), (60, 80, 2, 2)))
+    with pytest.raises(ValueError, match=r"covariance: .*indefinite matrix at pixel \(0, 0\)"):
+        make(flow, np.broadcast_to([[1e-4, 2e-4], [2e-4, 1e-4]], (60, 80, 2, 2)))
+    with pytest.raises(ValueError, match="interval: expected one of forward, central, instant"):
+        make(flow, interval="backward")
+
+
+def test_arrays_say_over_which_time_the_flow_is_taken():
+    # An enlargement by 1.2 a frame, as a step forward and as the mean of two steps.
+    y, x = np.mgrid[:20, :30].astype(float)
+    rates = {"forward": 0.2, "central": (1.2 - 1 / 1.2) / 2, "instant": np.log(1.2)}
+    for interval, rate in rates.items():
+        jacobian = np.broadcast_to(rate * np.eye(2), (20, 30, 2, 2))
+        field = jacoflow.FlowField.from_arrays(rate * np.stack([x, y], -1), None, jacobian, interval=interval)
+        assert_allclose(field.divergence, 2 * np.log(1.2), rtol=1e-12)
+
+
+def test_an_infinite_initial_flow_is_refused():
+    frames = jacoflow.scenes.Scene("affine", width=40, height=30, u=0.5).frames(2)
+    initial = np.zeros((30, 40, 2))
+    initial[3, 4, 1] = np.inf
+    with pytest.raises(ValueError, match="^initial: expected a finite flow"):
+        jacoflow.flow(*frames, initial=initial)
 
 
 def test_motion_from_somebody_elses_flow():

@@ -91,3 +91,11 @@ def test_others_take_other_types_too(take):
         take(frame + 2**60)
     with pytest.raises(TypeError, match="masked"):
         take(np.ma.array(frame))
+
+
+@pytest.mark.parametrize("frame", [3, np.int64(3), np.array(3.0)])
+def test_a_number_is_no_frame(frame):
+    with pytest.raises(ValueError, match=r"^first: expected a frame \(H, W\), got shape \(\)"):
+        jacoflow.flow(frame, frame)
+    with pytest.raises(ValueError, match=r"^frames: expected a frame \(H, W\), got shape \(\)"):
+        jacoflow.estimate([frame, frame])

@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 import jacoflow
 from jacoflow import io
@@ -99,6 +99,14 @@ def test_interval_and_scale_come_from_the_file(tmp_path):
     tifffile.imwrite(path, STACK, ome=True, metadata={"axes": "TYX", **scale}, photometric="minisblack")
     reader = io.frames(path)
     assert (reader.frame_rate, reader.pixel_pitch, reader.length_unit) == (50.0, (0.5, 0.25), "mm")
+    for scale, pitch in (
+        ({"PhysicalSizeX": 500.0, "PhysicalSizeXUnit": "nm", "PhysicalSizeY": 0.25}, (500.0, 250.0)),
+        ({"PhysicalSizeX": 500.0, "PhysicalSizeXUnit": "nm"}, (500.0, 500.0)),
+    ):
+        tifffile.imwrite(path, STACK, ome=True, metadata={"axes": "TYX", **scale}, photometric="minisblack")
+        reader = io.frames(path)
+        assert_allclose(reader.pixel_pitch, pitch)
+        assert reader.length_unit == "nm"
 
 
 def test_axes_without_names_are_refused(tmp_path):

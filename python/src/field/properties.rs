@@ -134,16 +134,19 @@ impl FlowField {
     /// work on it: (u, v) of shape (H, W, 2), their Jacobian (H, W, 2, 2), [[u_x, u_y], [v_x, v_y]], and the
     /// covariance of (u, v), (H, W, 2, 2), or with a Jacobian of (u, v, u_x, v_x, u_y, v_y), (H, W, 6, 6).
     ///
-    /// NaN where the flow is unknown. Without a Jacobian derivatives are zero. ValueError for other shapes
-    /// and negative variances.
+    /// NaN where the flow is unknown. Without a Jacobian derivatives are zero. `interval` is the time over
+    /// which the flow is taken: "forward" (default), from the field's frame to the next, "central", half the
+    /// displacement from the frame before to the one after, or "instant", the velocity. ValueError for other
+    /// shapes or names, negative variances and covariances with a negative eigenvalue.
     #[staticmethod]
-    #[pyo3(signature = (flow, covariance = None, jacobian = None))]
+    #[pyo3(signature = (flow, covariance = None, jacobian = None, *, interval = None))]
     fn from_arrays(
         flow: &Bound<'_, PyAny>,
         covariance: Option<&Bound<'_, PyAny>>,
         jacobian: Option<&Bound<'_, PyAny>>,
+        interval: Option<&str>,
     ) -> Outcome<Self> {
-        state::from_arrays(flow, covariance, jacobian)
+        state::from_arrays(flow, covariance, jacobian, interval)
     }
 
     /// Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError

@@ -75,8 +75,7 @@ fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> Outcome<FlowField> {
             stride: required(state, "stride")?.extract()?,
         },
     };
-    let interval: String = required(state, "interval")?.extract()?;
-    let interval = Interval::ALL.into_iter().find(|known| known.name() == interval).unwrap_or_default();
+    let interval = Interval::parse(&required(state, "interval")?.extract::<String>()?)?;
     let layout = FieldLayout {
         frame_size: required(state, "frame_size")?.extract()?,
         sites,
@@ -119,6 +118,7 @@ pub fn from_arrays(
     flow: &Bound<'_, PyAny>,
     covariance: Option<&Bound<'_, PyAny>>,
     jacobian: Option<&Bound<'_, PyAny>>,
+    interval: Option<&str>,
 ) -> Outcome<FlowField> {
     let (shape, values) = arrays::doubles("flow", flow)?;
     let [height, width, 2] = shape[..] else {
@@ -143,7 +143,9 @@ pub fn from_arrays(
     let side = if jacobian.is_some() { 6 } else { 2 };
     let upper: Vec<usize> = (0..side).flat_map(|i| (i..side).map(move |j| i * side + j)).collect();
     let covariance = covariance.map(|object| matrices("covariance", object, side, &upper)).transpose()?;
-    Ok(FlowField::single(jacoflow::types::FlowField::from_planes((width, height), motion, covariance)?))
+    let mut field = jacoflow::types::FlowField::from_planes((width, height), motion, covariance)?;
+    field.layout.interval = interval.map(Interval::parse).transpose()?.unwrap_or_default();
+    Ok(FlowField::single(field))
 }
 
 fn missing(name: &str) -> Raised {

@@ -72,11 +72,27 @@ pub(super) fn parse(path: &Path, description: &str, pages: usize) -> Result<Opti
     let interval: Option<f64> = pixels.number("TimeIncrement");
     let interval = interval.and_then(|interval| Some(interval * seconds(pixels.get("TimeIncrementUnit"))?));
     recording.frame_rate = interval.map(|interval| 1.0 / interval).filter(|rate| *rate > 0.0 && rate.is_finite());
-    let unit = |name| pixels.get(name).unwrap_or("\u{b5}m");
-    let pitch = pixels.number("PhysicalSizeX").zip(pixels.number("PhysicalSizeY"));
-    let pitch = pitch.filter(|_| unit("PhysicalSizeXUnit") == unit("PhysicalSizeYUnit"));
-    recording.pixel_size = pitch.and_then(|pitch| PixelSize::new(pitch, unit("PhysicalSizeXUnit")));
+    let size = |name: &str, unit: &str| Some((pixels.number::<f64>(name)?, pixels.get(unit).unwrap_or("\u{b5}m")));
+    let (x, y) = (size("PhysicalSizeX", "PhysicalSizeXUnit"), size("PhysicalSizeY", "PhysicalSizeYUnit"));
+    // Where one side is missing, pixels are square.
+    recording.pixel_size = x.or(y).zip(y.or(x)).and_then(|((x, unit), (y, of_y))| {
+        let y = if unit == of_y { y } else { y * metres(of_y)? / metres(unit)? };
+        PixelSize::new((x, y), unit)
+    });
     Ok(Some(recording))
+}
+
+/// A unit of length that OME-XML names, in metres.
+fn metres(unit: &str) -> Option<f64> {
+    Some(match unit {
+        "m" => 1.0,
+        "cm" => 1e-2,
+        "mm" => 1e-3,
+        "\u{b5}m" | "\u{3bc}m" => 1e-6,
+        "nm" => 1e-9,
+        "pm" => 1e-12,
+        _ => return None,
+    })
 }
 
 fn run(element: &Element<'_>) -> Run {

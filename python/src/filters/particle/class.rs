@@ -123,7 +123,7 @@ impl ParticleFilter {
         n_particles: Integer,
         batch: Option<Integer>,
         random_state: Option<Integer>,
-        ids: Option<Vec<Bound<'_, PyAny>>>,
+        ids: Option<&Bound<'_, PyAny>>,
         threads: Option<Integer>,
     ) -> Outcome<Self> {
         let batch = batch.map(|batch| count("batch", batch)).transpose()?;
@@ -132,11 +132,11 @@ impl ParticleFilter {
             Core::new(batch.unwrap_or(1), n_particles, dim_x, random_state.map(seed).transpose()?.unwrap_or(0))?;
         core.threads = self::threads(threads)?;
         if let Some(ids) = ids {
-            if ids.len() != core.batch {
-                let got = format!("{} integers", ids.len());
-                return Err(Error::argument("ids", format!("{} integers", core.batch), got).into());
+            let count = ids.len()?;
+            if count != core.batch {
+                return Err(Error::argument("ids", format!("{} integers", core.batch), count).into());
             }
-            core.targets = ids.iter().map(id).collect::<Outcome<_>>()?;
+            core.targets = ids.try_iter()?.map(|item| id(&item?)).collect::<Outcome<_>>()?;
         }
         let filter = Self { batch, dim_x, core: Mutex::new(core), x: Mutex::new(py.None()) };
         filter.take(py, &mut *lock(&filter.core)?)?;

@@ -1,0 +1,63 @@
+"""Arguments, checked by name before they are used."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def real_number(name: str, value: Any) -> float:
+    """A number, in its unit; TypeError by name for what is none."""
+    number: float = converted(name, value, float, "a number")
+    return number
+
+
+def positive_number(name: str, value: Any) -> float:
+    """A number above 0, in its unit; ValueError by name for another."""
+    number = real_number(name, value)
+    if not (number > 0 and np.isfinite(number)):
+        raise ValueError(f"{name}: expected a number above 0, got {number}")
+    return number
+
+
+def positive_integer(name: str, value: Any) -> int:
+    """An integer above 0, in its unit; ValueError by name for another."""
+    integer: int = converted(name, value, operator.index, "an integer")
+    if integer < 1:
+        raise ValueError(f"{name}: expected a positive integer, got {integer}")
+    return integer
+
+
+def numbers(name: str, value: Any, expected: str, shape: tuple[int | None, ...] | None = None) -> NDArray[np.float64]:
+    """Real numbers, in their unit, as an array of a shape in which None is any length; without `shape` of any."""
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        array = np.asarray(None)
+    if array.dtype.kind not in "iuf":
+        raise ValueError(f"{name}: expected {expected}, got {shown(value)}")
+    if shape is not None and (array.ndim != len(shape) or any(length not in (None, got) for length, got in zip(shape, array.shape, strict=True))):
+        raise ValueError(f"{name}: expected {expected}, got shape {array.shape}")
+    return array.astype(np.float64, copy=False)
+
+
+def converted(name: str, value: Any, convert: Callable[[Any], Any], expected: str) -> Any:
+    """What `convert` makes of a value, in its unit; TypeError by name where it cannot."""
+    try:
+        if isinstance(value, (str, bytes)):
+            raise TypeError
+        return convert(value)
+    except (TypeError, OverflowError):
+        raise TypeError(f"{name}: expected {expected}, got {shown(value)}") from None
+
+
+def shown(value: Any) -> str:
+    """A value in a message: a long one is cut, an array is its shape."""
+    if isinstance(value, np.ndarray) and value.size > 9:
+        return f"an array {value.shape} of {value.dtype}"
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
