@@ -66,6 +66,7 @@ RECORDED_MATCHERS = {
 LIMITS = "Limits of a step"
 TWO_MOTIONS = "Two motions in a region"
 NOISE = "Noise of a pair"
+DISCS = "Turning discs"
 HARD = "Tracking, 28 hard scenes, share of frames found / median error of the centre in px"
 SCENES = "Particle tracker, ten scenes"
 CHANCE = "3-D motion: what is said of scenes by chance"
@@ -130,6 +131,13 @@ def two_motions(record: Record) -> list[str]:
     names |= {"u_x": "u_x off by", "std of u_x": "std"}
     body = [[number(row["difference, px"], 1), *(number(row.get(name), 4) for name in names)] for row in record.sections[TWO_MOTIONS]]
     return lines(["difference, px", *names.values()], body)
+
+
+def turning_discs(record: Record) -> list[str]:
+    """What `measure` says of small objects that turn before a wall."""
+    digits = {"radius, px": 0, "turn, rad": 2, "ok": 2, "value": 3, "std": 3}
+    body = [[number(row.get(name), places) for name, places in digits.items()] for row in record.sections[DISCS]]
+    return lines(list(digits), body)
 
 
 def noise(record: Record) -> list[str]:
@@ -292,6 +300,7 @@ TABLES: dict[str, tuple[Callable[[Record], list[str]], tuple[str, ...]]] = {
     "motion": (motion, (CHANCE, VIEWS)),
     "limits": (limits, (LIMITS,)),
     "two_motions": (two_motions, (TWO_MOTIONS,)),
+    "turning_discs": (turning_discs, (DISCS,)),
     "noise": (noise, (NOISE,)),
     "parts": (parts, (FILTER, "Weighted mixtures, a round")),
 }

@@ -1,5 +1,5 @@
-"""How far a step from frame to frame may go, beside OpenCV; how close two motions in a region may be, and how much
-noise there may be.
+"""How far a step from frame to frame may go, beside OpenCV; how close two motions in a region may be, how small an
+object, and how much noise there may be.
 
     python -m benchmarks.tables.limits [--quick]
 """
@@ -19,6 +19,7 @@ Row = dict[str, object]
 TURNS, ENLARGEMENTS, SHIFTS = (5, 10, 15, 20, 30), (1.05, 1.1, 1.2, 1.3, 1.5), (8, 16, 32, 48, 64)
 DIFFERENCES, NOISES, FRACTIONS = (0.1, 0.2, 0.3, 0.5, 1.0), (0.0, 1.0, 2.0, 4.0, 8.0, 16.0), (0.25, 0.37, 0.8)
 SEEDS = (0, 1, 2)
+RADII, ANGLES = (15.0, 20.0, 25.0, 30.0, 45.0), (0.02, 0.06, 0.18)
 SQUARE = (40, 40, 81, 81)
 """The region that is measured."""
 MARGIN = 24
@@ -92,6 +93,30 @@ def two_motions(seeds: tuple[int, ...]) -> list[Row]:
     return rows
 
 
+def turning_discs(seeds: tuple[int, ...]) -> list[Row]:
+    """Textured discs that turn before a textured wall that stands still, from a pair: `measure` of the angular
+    velocity 3 px inside their edges, as shares of the truth, medians."""
+    rows: list[Row] = []
+    y, x = np.mgrid[: steps.SIZE, : steps.SIZE]
+    for radius in RADII:
+        for angle in ANGLES:
+            found = []
+            for seed in seeds:
+                picture, wall = steps.texture(seed), steps.moved(steps.texture(seed + 100), np.eye(2))
+                inside = np.hypot(x - steps.CENTRE[0], y - steps.CENTRE[1]) < radius
+                frames = [np.where(inside, steps.moved(picture, steps.turn(k * angle)), wall) for k in range(2)]
+                rng = np.random.default_rng(seed)
+                field = jacoflow.flow(*(eight_bit(frame, 1.0, rng) for frame in frames))
+                found.append(field.measure("angular_velocity", (*steps.CENTRE, radius - 3.0)))
+            known = [each for each in found if each.status == "ok"]
+            row: Row = {"radius, px": radius, "turn, rad": angle, "ok": len(known) / len(found)}
+            if known:
+                row["value"] = float(np.median([each.value for each in known])) / angle
+                row["std"] = float(np.median([each.std for each in known])) / angle
+            rows.append(row)
+    return rows
+
+
 def noise(seeds: tuple[int, ...]) -> list[Row]:
     """Means over a square of a texture that moves by a fraction of a pixel and grows by a hundredth, from a pair:
     errors of u and of the divergence as shares of the truth, with the stated ones, root mean squares."""
@@ -118,6 +143,7 @@ def _rms(values: list[float]) -> float:
 TABLES = {
     "limits": report.Table("Limits of a step", lambda o: limits(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "two_motions": report.Table("Two motions in a region", lambda o: two_motions(SEEDS[: 1 if o.quick else len(SEEDS)])),
+    "turning_discs": report.Table("Turning discs", lambda o: turning_discs(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "noise": report.Table("Noise of a pair", lambda o: noise(SEEDS[: 1 if o.quick else len(SEEDS)])),
 }
 

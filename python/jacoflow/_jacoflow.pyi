@@ -293,10 +293,11 @@ class FlowField:
 
         `region` as in `region_mean`. The motion is that of more than half of the valid sites, else the status
         is "no_dominant_motion" and the value NaN; with `at`, a pixel (x, y), that of the sites around it,
-        however few they are. u and v are those at the region's centre. A site follows the motion where its
-        flow differs by no more than its standard deviation and .1 px/frame explain at 99 %: motions that
-        differ by less are not separated, and `std` grows with what they leave. ValueError for unknown names,
-        a region without a site of the field, a pixel outside the frame, and for a field without covariance.
+        however few they are. u and v are those at the region's centre, or at `at`. A site follows the motion
+        where its flow differs by no more than its standard deviation and .1 px/frame explain at 99 %: motions
+        that differ by less are not separated, and `std` grows with what they leave. ValueError for unknown
+        names, a region without a site of the field, a pixel outside the frame, and for a field without
+        covariance.
 
         >>> import jacoflow
         >>> scene = jacoflow.scenes.Scene("affine", width=96, height=64, u_x=0.01, v_y=0.01)
@@ -449,7 +450,7 @@ class Measurement:
         """Its covariance, float64 array (6, 6) or (T, 6, 6), in squares of the field's units."""
     @property
     def centre(self) -> NDArray[np.float64]:
-        """Centre (x, y) of the region's sites, float64 array (2,) or (T, 2), px."""
+        """Centre (x, y) of the region's sites, or the pixel `at`, float64 array (2,) or (T, 2), px."""
 def estimate(
     frames: _Frames,
     *more: Any,
@@ -663,17 +664,17 @@ class FlowFilter:
 
         Where a neighbourhood holds NaN or a masked pixel the filter only predicts, and the result is NaN with
         status NON_FINITE. Where the frame contradicts the prediction (black, flashed, dropped) the motion is
-        that of the frames before, with status PREDICTED. ValueError for a frame of another size, and for masked
-        uint16 frames without `full_scale`; TypeError for another dtype; the filter is then unchanged.
+        that of the frames before, with status PREDICTED. ValueError for a frame of another size, and for
+        masked uint16 frames without `full_scale`; TypeError for another dtype; the filter is then unchanged.
         """
     def smooth(self, /, frames: _Frames) -> FlowField:
         """The fields of all `frames` (T, H, W), a stack of T, each from the frames before and after it.
 
-        A two-filter smoother (Fraser and Potter, 1969): two filters with these options run through the frames,
-        one of them backwards, and are joined at each frame. No lag, and at most the variance of the filter.
-        Where a frame is missing the motion is that of the frames around it, with status PREDICTED. The filter
-        itself stays as it is. All frames and fields are held in memory. Ctrl-C stops it. ValueError for frames
-        of different sizes, TypeError for different dtypes.
+        A two-filter smoother (Fraser and Potter, 1969): two filters with these options run through the
+        frames, one of them backwards, and are joined at each frame. Less lag, and at most the variance of the
+        filter. Where a frame is missing the motion is that of the frames around it, with status PREDICTED.
+        The filter itself stays as it is. All frames and fields are held in memory. Ctrl-C stops it.
+        ValueError for frames of different sizes, TypeError for different dtypes.
         """
     def reset(self, /) -> None:
         """Forgets every frame (H, W): the next one starts new filters."""

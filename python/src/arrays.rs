@@ -9,7 +9,7 @@ use numpy::ndarray::{ArrayView, IntoDimension, ShapeBuilder};
 use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyIterator, PyList};
+use pyo3::types::{PyList, PyString};
 
 /// Sample types that frames may have, for messages.
 const ACCEPTED: &str = "an array of bool, integers of 8 to 64 bits, float16, float32 or float64";
@@ -176,7 +176,7 @@ impl<'py> Frames<'py> {
         if is_sequence {
             return Ok(Self { count: object.len()?, object: object.clone(), colour, names: &[] });
         }
-        if object.cast::<PyIterator>().is_ok() {
+        if is_iterable(object)? {
             let list = object.try_iter()?.collect::<PyResult<Vec<_>>>()?;
             let list = PyList::new(object.py(), list)?;
             return Ok(Self { count: list.len(), object: list.into_any(), colour, names: &[] });
@@ -221,6 +221,13 @@ impl<'py> Frames<'py> {
         let name = self.names.get(index).copied().unwrap_or("frames");
         frame_with_gaps(name, &self.item(index)?, self.colour)
     }
+}
+
+/// Whether an object has items and is no array.
+fn is_iterable(object: &Bound<'_, PyAny>) -> Outcome<bool> {
+    let is_array = object.hasattr("__array__")? || object.hasattr("__array_interface__")?;
+    let is_text = object.is_instance_of::<PyString>() || object.hasattr("__fspath__")?;
+    Ok(!is_array && !is_text && object.try_iter().is_ok())
 }
 
 /// `mask`: a boolean array `(H, W)`, true where pixels may be used.

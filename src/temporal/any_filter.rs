@@ -1,8 +1,8 @@
 //! A flow filter whose precision and sample type are those of its first frame.
 
-use super::smoother::smooth;
+use super::smoother::{bytes, smooth};
 use super::{FlowFilter, FlowFilterOptions, SavedFilter};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_memory};
 use crate::image::Preprocess;
 use crate::io::Element;
 use crate::io::npz::NpzReader;
@@ -99,8 +99,8 @@ impl AnyFlowFilter {
         }
     }
 
-    /// The field of each of some frames from the frames before and after it, by filters that start anew; this
-    /// one stays as it is. See [`smoother`](super::smoother).
+    /// The field of each of some frames from the frames before and after it, by a two-filter smoother (D. C.
+    /// Fraser, J. E. Potter, 1969) with the options of this filter, which stays as it is.
     ///
     /// # Errors
     /// Those of [`push`](Self::push), naming `frames`.
@@ -120,6 +120,7 @@ impl AnyFlowFilter {
 
     fn smoothed<T: SimdReal>(&self, options: FlowFilterOptions, frames: &[AnyFrame]) -> Result<Vec<FlowField<T>>> {
         let filter = FlowFilter::<T>::new(frames[0].size(), options)?;
+        check_memory("frames", bytes(&filter, frames.len()))?;
         let prepare = |frame: &AnyFrame| self.preprocess.apply(frame.to_real());
         let prepared: Vec<_> = filter.options().threads.install(|| frames.iter().map(prepare).collect());
         smooth(&filter, &prepared)

@@ -1,25 +1,26 @@
 //! Flow and Jacobian of every frame from the frames before and after it.
 //!
-//! A filter runs through the frames and another one through them backwards, and both are joined at each frame:
-//! the two-filter smoother (D. C. Fraser, J. E. Potter, "The optimum linear smoother as a combination of two
-//! optimum linear filters", IEEE Transactions on Automatic Control 14, 1969), of the motion alone. With `m`,
-//! `P` of the filter, `-m'`, `P'` of the one that runs backwards, and `m0`, `P0` of what that one knows
-//! without any frame,
+//! A filter runs through the frames and another one through them backwards, and both are joined at each
+//! frame: the two-filter smoother (D. C. Fraser, J. E. Potter, "The optimum linear smoother as a combination
+//! of two optimum linear filters", IEEE Transactions on Automatic Control 14, 1969), of the motion alone.
+//! With `m`, `P` of the filter, `m'`, `P'` of the one that runs backwards, and `m0`, `P0` of what that one
+//! knows without any frame,
 //!
 //! ```text
 //! P_s = (P^-1 + P'^-1 - P0^-1)^-1,   m_s = P_s (P^-1 m - P'^-1 m' + P0^-1 m0).
 //! ```
 //!
 //! Both have measured the frame itself; its noise enters them with opposite signs, so that `P_s` is not too
-//! small. What the fields hold beyond `P` (systematic errors, the same both ways) is kept whole.
+//! small. What the fields hold beyond `P` (systematic errors, the same both ways) is kept whole; at a missing
+//! frame it is that of the next one.
 
 use super::FlowFilter;
 use super::flow_filter::PAIRS;
-use crate::error::{Result, check_memory};
+use crate::error::Result;
 use crate::parallel::checkpoint;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, MOTION_NAMES, Status};
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{Matrix6, SymmetricEigen, Vector6};
 use rayon::prelude::*;
 
 /// Numbers of a site: motion, and the upper triangle of its covariance.
@@ -36,8 +37,6 @@ const MOTION: usize = 6;
 /// # Errors
 /// Those of [`FlowFilter::push`]; [`Error::Memory`](crate::Error::Memory) for more frames than there is room.
 pub(super) fn smooth<T: SimdReal>(filter: &FlowFilter<T>, frames: &[Frame<T>]) -> Result<Vec<FlowField<T>>> {
-    let sites = filter.store.sites.len();
-    check_memory("frames", frames.len().checked_mul(2 * sites * NUMBERS * size_of::<T>()))?;
     let threads = filter.options.threads;
     let (mut ahead, mut options) = (filter.clone(), filter.options.clone());
     options.initial_mean[MOTION..].iter_mut().for_each(|m| *m = -*m);
@@ -48,16 +47,33 @@ pub(super) fn smooth<T: SimdReal>(filter: &FlowFilter<T>, frames: &[Frame<T>]) -
         fields.push(ahead.push(frame)?);
         states.push(threads.install(|| motions(&ahead)));
     }
+    let sites = &filter.store.sites;
+    let is_seen = |&site: &usize| fields.iter().any(|field| field.status[site] != Status::NonFinite);
+    let seen: Vec<bool> = sites.iter().map(is_seen).collect();
+    let mut beyond = vec![Matrix6::zeros(); sites.len()];
     for (t, frame) in frames.iter().enumerate().rev() {
         checkpoint();
         back.push(frame)?;
         let known = Known::new(&back, frames.len() - t);
         threads.install(|| {
-            let joined: Vec<_> = states[t].par_iter().zip(motions(&back)).map(|(a, b)| known.join(a, &b)).collect();
-            write(&mut fields[t], (&filter.store.sites, &states[t]), &joined);
+            update_beyond(&mut beyond, &fields[t], (sites, &states[t]));
+            let joined: Vec<_> = states[t]
+                .par_iter()
+                .zip(motions(&back))
+                .zip(&beyond)
+                .map(|((ahead, back), beyond)| with(known.join(ahead, &back), beyond))
+                .collect();
+            write(&mut fields[t], sites.iter().zip(&seen).zip(&joined));
         });
     }
     Ok(fields)
+}
+
+/// Bytes that a smoother needs for so many frames: states, fields, and fields in a stack.
+pub(super) fn bytes<T>(filter: &FlowFilter<T>, frames: usize) -> Option<usize> {
+    let (width, height) = filter.frame_size;
+    let planes = size_of::<T>() * (1 + 3 * NUMBERS + 2);
+    frames.checked_mul(width)?.checked_mul(height)?.checked_mul(planes)
 }
 
 /// The motion of a site with its covariance.
@@ -99,41 +115,81 @@ impl Known {
     }
 
     /// Both filters' states joined; that of the first where the other one adds nothing.
-    fn join<T: SimdReal>(&self, ahead: &Site<T>, back: &Site<T>) -> Site<T> {
+    fn join<T: SimdReal>(&self, ahead: &Site<T>, back: &Site<T>) -> (Vector6<f64>, Matrix6<f64>) {
+        let ((m, p), (n, q)) = (parts(ahead), parts(back));
+        // In units in which the first filter's variances are one.
+        let unit = p.diagonal().map(f64::sqrt);
+        let scaled = |c: &Matrix6<f64>| Matrix6::from_fn(|i, j| c[(i, j)] / unit[i] / unit[j]);
         let joined = || {
-            let ((m, p), (n, q)) = (parts(ahead), parts(back));
-            let (inverse, other) = (p.cholesky()?.inverse(), q.cholesky()?.inverse());
-            let root = (inverse + other - self.information).cholesky()?;
-            let (mean, covariance) = (root.solve(&(inverse * m - (other * n - self.weighted))), root.inverse());
-            let is_better = (0..6).all(|k| covariance[(k, k)] <= p[(k, k)]);
+            let (inverse, other) = (scaled(&p).cholesky()?.inverse(), scaled(&q).cholesky()?.inverse());
+            let known = Matrix6::from_fn(|i, j| self.information[(i, j)] * unit[i] * unit[j]);
+            let root = (inverse + other - known).cholesky()?;
+            let right = inverse * m.component_div(&unit)
+                - (other * n.component_div(&unit) - self.weighted.component_mul(&unit));
+            let mean = root.solve(&right).component_mul(&unit);
+            // A square, so that rounding leaves it definite.
+            let half = root.l().try_inverse()?;
+            let covariance = half.transpose() * half;
+            let is_better = (0..6).all(|k| covariance[(k, k)] <= 1.0);
+            let covariance = Matrix6::from_fn(|i, j| covariance[(i, j)] * unit[i] * unit[j]);
             (is_better && mean.iter().all(|value| value.is_finite())).then_some((mean, covariance))
         };
-        let Some((mean, covariance)) = joined() else { return *ahead };
-        std::array::from_fn(|k| T::from_f64(if k < 6 { mean[k] } else { covariance[PAIRS[k - 6]] }))
+        joined().unwrap_or((m, p))
     }
 }
 
-/// Replaces the motion of the live sites in a field, and in their covariance the part of the filter.
-fn write<T: SimdReal>(field: &mut FlowField<T>, (sites, before): (&[usize], &[Site<T>]), joined: &[Site<T>]) {
+/// A motion with what its covariance lacks.
+fn with<T: SimdReal>((mean, covariance): (Vector6<f64>, Matrix6<f64>), beyond: &Matrix6<f64>) -> Site<T> {
+    std::array::from_fn(|k| T::from_f64(if k < 6 { mean[k] } else { covariance[PAIRS[k - 6]] + beyond[PAIRS[k - 6]] }))
+}
+
+/// What the covariance of a field holds beyond that of the filter, at each site that is measured there: the
+/// part of it that is positive semi-definite and more than rounding.
+fn update_beyond<T: SimdReal>(
+    beyond: &mut [Matrix6<f64>],
+    field: &FlowField<T>,
+    (sites, states): (&[usize], &[Site<T>]),
+) {
+    let Some(planes) = &field.covariance else { return };
+    let (n, units) = (field.len(), MOTION_NAMES.map(|name| field.layout.units.scale(name)));
+    beyond.par_iter_mut().zip(sites).zip(states).for_each(|((beyond, &site), state)| {
+        if field.status[site] == Status::NonFinite {
+            return;
+        }
+        let (_, own) = parts(state);
+        let unit = own.diagonal().map(f64::sqrt);
+        let mut excess = Matrix6::zeros();
+        for (k, &(i, j)) in PAIRS.iter().enumerate() {
+            let whole = planes[k * n + site].to_f64() / (units[i] * units[j]);
+            let value = (whole - own[(i, j)]) / (unit[i] * unit[j]);
+            (excess[(i, j)], excess[(j, i)]) = (value, value);
+        }
+        *beyond = Matrix6::zeros();
+        if excess.iter().all(|value| value.is_finite()) && excess.amax() > ROUNDING {
+            let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(excess);
+            let kept = eigenvalues.map(|value| if value > ROUNDING { value } else { 0.0 });
+            let part = eigenvectors * Matrix6::from_diagonal(&kept) * eigenvectors.transpose();
+            *beyond = Matrix6::from_fn(|i, j| part[(i, j)] * unit[i] * unit[j]);
+        }
+    });
+}
+
+/// Replaces the motion of live sites in a field, and its covariance. Sites that no frame has measured stay
+/// unknown.
+fn write<'a, T: SimdReal>(field: &mut FlowField<T>, sites: impl Iterator<Item = ((&'a usize, &'a bool), &'a Site<T>)>) {
     let n = field.len();
     let units = MOTION_NAMES.map(|name| T::from_f64(field.layout.units.scale(name)));
-    for ((&site, old), new) in sites.iter().zip(before).zip(joined) {
-        let is_missing = field.status[site] == Status::NonFinite;
-        if is_missing {
+    for ((&site, _), new) in sites.filter(|((_, is_seen), _)| **is_seen) {
+        if field.status[site] == Status::NonFinite {
             field.status[site] = Status::Predicted;
         }
         for k in 0..6 {
             field.motion[k * n + site] = new[k] * units[k];
         }
-        let Some(covariance) = &mut field.covariance else { continue };
-        let own = |site: &Site<T>, k: usize| site[6 + k] * units[PAIRS[k].0] * units[PAIRS[k].1];
-        let mut beyond: [T; PAIRS.len()] = std::array::from_fn(|k| covariance[k * n + site] - own(old, k));
-        let is_rounding = |k: usize| beyond[k].to_f64() < ROUNDING * own(old, k).to_f64();
-        if is_missing || (0..PAIRS.len()).filter(|&k| PAIRS[k].0 == PAIRS[k].1).all(is_rounding) {
-            beyond = [T::from_f64(0.0); PAIRS.len()];
-        }
-        for k in 0..PAIRS.len() {
-            covariance[k * n + site] = own(new, k) + beyond[k];
+        if let Some(covariance) = &mut field.covariance {
+            for (k, &(i, j)) in PAIRS.iter().enumerate() {
+                covariance[k * n + site] = new[6 + k] * units[i] * units[j];
+            }
         }
     }
 }

@@ -124,3 +124,43 @@ def test_masked_pixels_cost_their_neighbourhoods_only():
     assert (field.status[10:14, 10:14] == Status.NON_FINITE).all()
     assert_allclose(field.u[:, 20:], plain.u[:, 20:], rtol=1e-5, atol=1e-6)
     assert jacoflow.FlowFilter(profile=FilterProfile(full_scale=65535.0)).push(np.ma.masked_array(frames[0].astype(np.uint16) * 257)).valid.any()
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize(
+    "profile",
+    [
+        FilterProfile(Q=np.zeros(12), R=1e-6, P0=np.full(12, 100.0)),
+        FilterProfile(name="measured", P0=np.full(12, 1e3)),
+        FilterProfile(Q=np.zeros(12), R=1e-13, P0=np.full(12, 1e6)),
+        FilterProfile(Q=np.full(12, 1e-12), R=1e-12, P0=np.full(12, 1e12)),
+    ],
+)
+def test_covariances_are_definite(profile, precision):
+    smoothed = FlowFilter(profile=profile, precision=precision).smooth(swinging()[0][:10])
+    matrices = np.asarray(smoothed.covariance, float)[smoothed.valid]
+    deviations = np.sqrt(np.einsum("nii->ni", matrices))
+    assert (deviations > 0).all()
+    eigenvalues = np.linalg.eigvalsh(matrices / deviations[:, :, None] / deviations[:, None, :])
+    assert eigenvalues.min() > (-1e-5 if precision == "float32" else -1e-12)
+
+
+def test_sites_that_no_frame_shows_stay_unknown():
+    smoothed = FlowFilter().smooth(np.full((4, *SIZE), np.nan))
+    assert not smoothed.valid.any() and np.isnan(smoothed.u).all()
+
+
+def test_more_frames_than_there_is_memory_are_refused_at_once():
+    with pytest.raises(MemoryError, match="^frames"):
+        FlowFilter().smooth(np.broadcast_to(np.uint8(3), (10**12, 30, 30)))
+
+
+def test_frames_may_be_any_iterable(runs):
+    frames = runs[0][:4]
+
+    class Recording:
+        def __iter__(self):
+            return iter(frames)
+
+    assert_array_equal(FlowFilter().smooth(Recording()).u, FlowFilter().smooth(frames).u)
+    assert_array_equal(jacoflow.estimate(dict(enumerate(frames)).values(), method="windowed").u, jacoflow.estimate(frames, method="windowed").u)

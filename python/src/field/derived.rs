@@ -56,6 +56,10 @@ pub fn region<T: Real>(
 pub fn measured(layout: &FieldLayout, name: &str) -> Result<Measured> {
     match MOTION_NAMES.iter().position(|known| *known == name) {
         Some(place) => Ok(Measured::Parameter(place)),
+        None if layout.parameters.iter().any(|known| known == name) => {
+            let expected = "a parameter of affine motion or a derived quantity; region_mean takes the others";
+            Err(Error::argument("name", expected, format!("{name:?}")))
+        }
         None => quantity(layout, name).map(Measured::Derived),
     }
 }

@@ -168,7 +168,7 @@ impl Measurement {
         arrays::owned(py, &shape, self.rows.iter().flat_map(|row| row.fit.covariance.into_iter().flatten()).collect())
     }
 
-    /// Centre (x, y) of the region's sites, float64 array (2,) or (T, 2), px.
+    /// Centre (x, y) of the region's sites, or the pixel `at`, float64 array (2,) or (T, 2), px.
     #[getter]
     fn centre<'py>(&self, py: Python<'py>) -> Outcome<Bound<'py, PyAny>> {
         let shape = if self.is_stack { vec![self.rows.len(), 2] } else { vec![2] };

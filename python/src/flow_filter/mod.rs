@@ -10,7 +10,7 @@ use crate::errors::Outcome;
 use crate::image::renamed;
 use crate::interrupt::{alone, interruptible};
 use arguments::{Arguments, filter_options};
-use jacoflow::error::Error;
+use jacoflow::error::{Error, check_memory};
 use jacoflow::temporal::AnyFlowFilter;
 use jacoflow::types::{AnyFrame, SamplingGrid};
 use pyo3::prelude::*;
@@ -39,8 +39,8 @@ impl FlowFilter {
     ///
     /// Where a neighbourhood holds NaN or a masked pixel the filter only predicts, and the result is NaN with
     /// status NON_FINITE. Where the frame contradicts the prediction (black, flashed, dropped) the motion is
-    /// that of the frames before, with status PREDICTED. ValueError for a frame of another size, and for masked
-    /// uint16 frames without `full_scale`; TypeError for another dtype; the filter is then unchanged.
+    /// that of the frames before, with status PREDICTED. ValueError for a frame of another size, and for
+    /// masked uint16 frames without `full_scale`; TypeError for another dtype; the filter is then unchanged.
     fn push(slf: &Bound<'_, Self>, frame: &Bound<'_, PyAny>) -> Outcome<FlowField> {
         let (py, mut this) = (slf.py(), alone(slf)?);
         let frame = this.frame("frame", frame)?;
@@ -50,21 +50,30 @@ impl FlowFilter {
 
     /// The fields of all `frames` (T, H, W), a stack of T, each from the frames before and after it.
     ///
-    /// A two-filter smoother (Fraser and Potter, 1969): two filters with these options run through the frames,
-    /// one of them backwards, and are joined at each frame. No lag, and at most the variance of the filter.
-    /// Where a frame is missing the motion is that of the frames around it, with status PREDICTED. The filter
-    /// itself stays as it is. All frames and fields are held in memory. Ctrl-C stops it. ValueError for frames
-    /// of different sizes, TypeError for different dtypes.
+    /// A two-filter smoother (Fraser and Potter, 1969): two filters with these options run through the
+    /// frames, one of them backwards, and are joined at each frame. Less lag, and at most the variance of the
+    /// filter. Where a frame is missing the motion is that of the frames around it, with status PREDICTED.
+    /// The filter itself stays as it is. All frames and fields are held in memory. Ctrl-C stops it.
+    /// ValueError for frames of different sizes, TypeError for different dtypes.
     fn smooth(slf: &Bound<'_, Self>, frames: &Bound<'_, PyAny>) -> Outcome<FlowField> {
         let (py, this) = (slf.py(), alone(slf)?);
         let frames = Frames::new(frames, this.colour)?;
         if frames.count == 0 {
             return Err(Error::argument("frames", "at least 1 frame", "0 frames").into());
         }
-        let frame = |index| this.frame("frames", &frames.item(index)?);
-        let frames = (0..frames.count).map(frame).collect::<Outcome<Vec<_>>>()?;
+        let mut taken = Vec::new();
+        for index in 0..frames.count {
+            py.check_signals()?;
+            let frame = this.frame("frames", &frames.item(index)?)?;
+            if index == 0 {
+                // Of what follows this is the least part: a view of one frame may be of any length.
+                let samples = frame.size().0.checked_mul(frame.size().1);
+                check_memory("frames", samples.and_then(|n| n.checked_mul(frames.count * 100 * size_of::<f32>())))?;
+            }
+            taken.push(frame);
+        }
         let filter = &this.filter;
-        let smoothed = interruptible(py, || filter.smooth(&frames).map_err(|error| renamed(error, "frame", "frames")))?;
+        let smoothed = interruptible(py, || filter.smooth(&taken).map_err(|error| renamed(error, "frame", "frames")))?;
         let mut fields = Growing::None;
         for field in smoothed {
             fields.add(field)?;

@@ -8,23 +8,23 @@ use crate::types::FlowField;
 const STRIPS: usize = 4;
 /// Deviations of the squares of the parts' residuals that are taken for chance.
 const CHANCE: f64 = 2.0;
-/// Variance that an affine motion takes from two motions that meet in the middle of a region, over the variance
-/// it leaves: 3 for a step, more for one that the field smooths.
-const TAKEN: f64 = 6.0;
+/// Variance that an affine motion takes from two motions that meet in the middle of a region, over the
+/// variance it leaves: 3 for a step, some 15 for one that the field smooths (`benchmarks/tables/limits.py`).
+const TAKEN: f64 = 15.0;
 
-/// Variances that a fit gets from residuals which are not independent over the region.
+/// Covariance, about `centre`, that a fit gets from residuals which are not independent over the region.
 ///
 /// The residuals of the flow of all sites that may follow the motion, weighted by the inverse variance, are
 /// averaged over `STRIPS` parts of the region along x, and along y. What their squares exceed those of
 /// residuals without structure by (analysis of variance) belongs to a motion that the fit does not hold, and
-/// of which it took `TAKEN` times as much: as an error of the flow at the centre, and of its change along
-/// that axis.
+/// of which it took `TAKEN` times as much: as an error of the flow in the middle of the sites, and of its
+/// change along that axis.
 pub(super) fn common_residual<T: Real>(
     field: &FlowField<T>,
     used: &[usize],
     (centre, motion): ((f64, f64), &[f64; 6]),
     floors: &[f64; 6],
-) -> [f64; 6] {
+) -> [[f64; 6]; 6] {
     let pitch = [field.layout.units.pixel_pitch.0, field.layout.units.pixel_pitch.1];
     let places: Vec<[usize; 2]> = used
         .iter()
@@ -34,7 +34,7 @@ pub(super) fn common_residual<T: Real>(
     let offset = |place: &[usize; 2], axis: usize| (place[axis] as f64 - [centre.0, centre.1][axis]) * pitch[axis];
     let sharing = sharing_among(&field.layout, field.width, used);
     let by_chance = STRIPS as f64 * (1.0 + CHANCE * (2.0 / STRIPS as f64).sqrt()) * sharing;
-    let mut variances = [0.0; 6];
+    let mut covariance = [[0.0; 6]; 6];
     for component in 0..2 {
         let floor = floors[component];
         // The weight and the residual of each site.
@@ -53,20 +53,26 @@ pub(super) fn common_residual<T: Real>(
         for axis in 0..2 {
             let (first, last) = places.iter().fold((usize::MAX, 0), |(a, b), p| (a.min(p[axis]), b.max(p[axis])));
             let mut strips = [(0.0, 0.0); STRIPS];
-            let mut spread = 0.0;
+            let (mut sum, mut square_of_place) = (0.0, 0.0);
             for (&(weight, residual), place) in residuals.iter().zip(&places) {
                 let strip = &mut strips[STRIPS * (place[axis] - first) / (last - first + 1)];
                 *strip = (strip.0 + weight, strip.1 + weight * residual);
-                spread += weight * offset(place, axis).powi(2);
+                sum += weight * offset(place, axis);
+                square_of_place += weight * offset(place, axis).powi(2);
             }
             let between: f64 =
                 strips.iter().filter(|strip| strip.0 > 0.0).map(|(weight, sum)| sum * sum / weight).sum();
             let taken = TAKEN * (between - by_chance * (square - between) / used.len() as f64);
             if taken > 0.0 {
-                variances[component] += taken / total;
-                variances[2 + 2 * axis + component] = taken / spread;
+                // From the middle of the sites to the centre the change counts, too.
+                let (middle, slope) = (sum / total, taken / (square_of_place - sum * sum / total));
+                let change = 2 + 2 * axis + component;
+                covariance[component][component] += taken / total + middle * middle * slope;
+                covariance[component][change] -= middle * slope;
+                covariance[change][component] -= middle * slope;
+                covariance[change][change] += slope;
             }
         }
     }
-    variances
+    covariance
 }

@@ -4,8 +4,8 @@
 //!
 //! `quantity` has the names and units, `rate` the rates that displacements stand for, `value` the formulas
 //! and their standard deviations. A region gives one number by its mean motion (`mean`) or by the one
-//! affine motion that most of it follows (`dominant` finds it, `region_motion` fits it, `common_residual` judges
-//! the fit); both allow for `sharing`, the pixels that estimates have in common.
+//! affine motion that most of it follows (`dominant` finds it, `region_motion` fits it, `common_residual`
+//! judges the fit); both allow for `sharing`, the pixels that estimates have in common.
 
 mod common_residual;
 mod dominant;

@@ -30,14 +30,14 @@ pub enum RegionStatus {
 
 choices!(RegionStatus, "status": Ok "ok", NoDominantMotion "no_dominant_motion", TooFewSites "too_few_sites");
 
-/// The motion of a region about its centre.
+/// The motion of a region about its centre, or about the point in it that was given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RegionMotion {
     /// `(u, v, u_x, v_x, u_y, v_y)` at the centre, in the units of the field; NaN unless the status is `Ok`.
     pub motion: [f64; 6],
     /// Covariance of the motion.
     pub covariance: [[f64; 6]; 6],
-    /// The centre of the region's sites in pixels.
+    /// The centre of the region's sites, or the given point, px.
     pub centre: (f64, f64),
     /// Sites that follow the motion.
     pub count: usize,
@@ -85,7 +85,7 @@ pub fn measure_parameter(place: usize, fit: &RegionMotion) -> (f64, f64) {
     (fit.motion[place], fit.covariance[place][place].sqrt())
 }
 
-/// Fits one affine motion `m0` about the centre to the estimates `m_i` (covariance `C_i`) of the valid sites
+/// Fits one affine motion `m0` about the centre (or `at`) to the estimates `m_i` (covariance `C_i`) of the valid sites
 /// in `region` (`None`: all) that follow the motion of most of them, or with `at`, a pixel `(x, y)`, that of
 /// the sites around it: `min sum (m_i - T_i m0)^T C_i^-1 (m_i - T_i m0)`, where `T_i` carries the affine
 /// motion from the centre to the site.
@@ -122,7 +122,7 @@ pub fn fit_region<T: Real>(
     let inside = sites_in(field, region)?;
     let n = inside.len().max(1) as f64;
     let sum = inside.iter().map(|&index| pixel(index)).fold((0.0, 0.0), |sum, at| (sum.0 + at.0, sum.1 + at.1));
-    let centre = (sum.0 / n, sum.1 / n);
+    let centre = at.unwrap_or((sum.0 / n, sum.1 / n));
     let scale = [field.layout.units.scale("u"), field.layout.units.scale("v")];
     let valid = valid_sites(field, &inside);
     let sites: Vec<Site> = valid
@@ -162,8 +162,9 @@ pub fn fit_region<T: Real>(
     }
     let Some((motion, mut covariance)) = least_squares(field, &followers, centre) else { return Ok(unknown) };
     let near: Vec<usize> = sites.iter().filter(|site| dominant.may_hold(site)).map(|site| site.index).collect();
-    for (k, variance) in common_residual(field, &near, (centre, &motion), &floors(field)).into_iter().enumerate() {
-        covariance[k][k] += variance;
+    let common = common_residual(field, &near, (centre, &motion), &floors(field));
+    for (row, more) in covariance.iter_mut().zip(common) {
+        row.iter_mut().zip(more).for_each(|(value, more)| *value += more);
     }
     Ok(RegionMotion { motion, covariance, count, status: RegionStatus::Ok, ..unknown })
 }
