@@ -69,11 +69,12 @@ pub(super) fn smooth<T: SimdReal>(filter: &FlowFilter<T>, frames: &[Frame<T>]) -
     Ok(fields)
 }
 
-/// Bytes that a smoother needs for so many frames: states, fields, and fields in a stack.
+/// Bytes that a smoother needs for so many frames: the frames, and at each site states, fields, and fields in
+/// a stack.
 pub(super) fn bytes<T>(filter: &FlowFilter<T>, frames: usize) -> Option<usize> {
     let (width, height) = filter.frame_size;
-    let planes = size_of::<T>() * (1 + 3 * NUMBERS + 2);
-    frames.checked_mul(width)?.checked_mul(height)?.checked_mul(planes)
+    let sites = filter.store.sites.len().checked_mul(3 * NUMBERS + 2)?;
+    frames.checked_mul(width.checked_mul(height)?.checked_add(sites)?)?.checked_mul(size_of::<T>())
 }
 
 /// The motion of a site with its covariance.

@@ -66,9 +66,9 @@ impl FlowFilter {
             py.check_signals()?;
             let frame = this.frame("frames", &frames.item(index)?)?;
             if index == 0 {
-                // Of what follows this is the least part: a view of one frame may be of any length.
-                let samples = frame.size().0.checked_mul(frame.size().1);
-                check_memory("frames", samples.and_then(|n| n.checked_mul(frames.count * 100 * size_of::<f32>())))?;
+                // A view of one frame may be of any length.
+                let samples = frame.size().0.checked_mul(frame.size().1).and_then(|n| n.checked_mul(frames.count));
+                check_memory("frames", samples.and_then(|n| n.checked_mul(size_of::<f32>())))?;
             }
             taken.push(frame);
         }
