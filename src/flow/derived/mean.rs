@@ -130,7 +130,9 @@ fn mean_of_plane<T: Real>(
     if aggregate == Aggregate::Median {
         let mut values: Vec<f64> = used.iter().map(|&index| value(index)).collect();
         let Some(middle) = central_median(&mut values) else { return Ok(Mean::UNKNOWN) };
-        values.iter_mut().for_each(|value| *value = (*value - middle).abs());
+        for value in &mut values {
+            *value = (*value - middle).abs();
+        }
         let spread = MAD_TO_STD * central_median(&mut values).unwrap_or(f64::NAN);
         return Ok(Mean { value: middle, std: MEDIAN_EFFICIENCY * spread * (sharing / n).sqrt(), count: used.len() });
     }
