@@ -47,8 +47,8 @@ impl Mean {
 /// than half of the region's estimates.
 ///
 /// # Errors
-/// As [`plane`](super::plane()); [`Error::Argument`] naming `region` for one that does not fit the frame, and `aggregate`
-/// for [`Aggregate::InverseVariance`] on a field without covariance.
+/// As [`plane`](super::plane()); [`Error::Argument`] naming `region` for one that does not fit the frame, and
+/// `aggregate` for [`Aggregate::InverseVariance`] on a field without covariance.
 pub fn region_mean<T: Real>(
     field: &FlowField<T>,
     quantity: Quantity,

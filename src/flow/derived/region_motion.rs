@@ -85,10 +85,10 @@ pub fn measure_parameter(place: usize, fit: &RegionMotion) -> (f64, f64) {
     (fit.motion[place], fit.covariance[place][place].sqrt())
 }
 
-/// Fits one affine motion `m0` about the centre (or `at`) to the estimates `m_i` (covariance `C_i`) of the valid sites
-/// in `region` (`None`: all) that follow the motion of most of them, or with `at`, a pixel `(x, y)`, that of
-/// the sites around it: `min sum (m_i - T_i m0)^T C_i^-1 (m_i - T_i m0)`, where `T_i` carries the affine
-/// motion from the centre to the site.
+/// Fits one affine motion `m0` about the centre (or `at`) to the estimates `m_i` (covariance `C_i`) of the
+/// valid sites in `region` (`None`: all) that follow the motion of most of them, or with `at`, a pixel
+/// `(x, y)`, that of the sites around it: `min sum (m_i - T_i m0)^T C_i^-1 (m_i - T_i m0)`, where `T_i`
+/// carries the affine motion from the centre to the site.
 ///
 /// Estimates of neighbouring sites share pixels; the covariance is enlarged by [`sharing`](super::sharing()).
 /// Where the estimates scatter more than their covariances allow, it is enlarged by that ratio too (R. T.
