@@ -94,7 +94,7 @@ pub fn measure_parameter(place: usize, fit: &RegionMotion) -> (f64, f64) {
 /// Where the estimates scatter more than their covariances allow, it is enlarged by that ratio too (R. T.
 /// Birge, "The calculation of errors by the method of least squares", 1932). Where they scatter less, they
 /// have an error in common, which does not shrink with their number: the covariance holds it in full. What
-/// the residuals have in common over parts of the region (two motions that hardly differ, a flow that is not
+/// the residuals have in common over parts of the region (two motions that are close, a flow that is not
 /// affine) does not shrink either; an analysis of variance finds it.
 ///
 /// # Errors

@@ -6,7 +6,7 @@
 //! jet; `factor` and `vector` serve both.
 //!
 //! Between frames a state holds the lower root `L` of its covariance `L L^T`, with the components in
-//! [`order`]: the product is definite whatever rounding does, and the next prediction spreads its sigma
+//! [`order`]: rounding cannot make the product indefinite, and the next prediction spreads its sigma
 //! points by the root. From `predict` to `update` the same planes hold the predicted covariance.
 
 pub(super) mod factor;
