@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ._checks import shown
 from ._jacoflow import MissingDependencyError
 
 if TYPE_CHECKING:
@@ -26,6 +27,7 @@ def pyplot_or_error() -> Any:
 def axes_or_new(axes: Axes | None) -> Axes:
     """The axes given, or those of a new figure."""
     if axes is not None:
+        check_parts("axes", axes, "matplotlib.axes.Axes", ("imshow", "quiver"))
         return axes
     new: Axes = pyplot_or_error().subplots(layout="constrained")[1]
     return new
@@ -35,6 +37,15 @@ def check_parts(name: str, value: object, kind: str, parts: tuple[str, ...]) -> 
     """TypeError naming the argument for an object without the parts that are drawn."""
     if not all(hasattr(value, part) for part in parts):
         raise TypeError(f"{name}: expected an object like {kind}, got {type(value).__name__}")
+
+
+def expect_colour(name: str, value: object) -> None:
+    """ValueError naming the argument for what is no colour of matplotlib's."""
+    pyplot_or_error()
+    from matplotlib.colors import is_color_like
+
+    if not is_color_like(value):
+        raise ValueError(f"{name}: expected a colour as matplotlib takes it, got {shown(value)}")
 
 
 def frame_extent(shape: tuple[int, ...]) -> tuple[float, float, float, float]:

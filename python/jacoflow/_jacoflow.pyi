@@ -356,7 +356,7 @@ class FlowField:
         """Size (width, height) of the frames, px."""
     @property
     def frame_period(self) -> float | None:
-        """Seconds between frames, or None."""
+        """Seconds between frames, or None; of the first field of a stack."""
     @property
     def pixel_pitch(self) -> tuple[float, float]:
         """Physical size (dx, dy) of a pixel, 1 px or any length unit."""
@@ -400,10 +400,11 @@ class FlowField:
         work on it: (u, v) of shape (H, W, 2), their Jacobian (H, W, 2, 2), [[u_x, u_y], [v_x, v_y]], and the
         covariance of (u, v), (H, W, 2, 2), or with a Jacobian of (u, v, u_x, v_x, u_y, v_y), (H, W, 6, 6).
 
-        NaN where the flow is unknown. Without a Jacobian derivatives are zero. `interval` is the time over
-        which the flow is taken: "forward" (default), from the field's frame to the next, "central", half the
-        displacement from the frame before to the one after, or "instant", the velocity. ValueError for other
-        shapes or names, negative variances and covariances with a negative eigenvalue.
+        NaN where the flow is unknown. Without a Jacobian derivatives read as zero, and quantities of them
+        (`divergence`, ...) are refused. `interval` is the time over which the flow is taken: "forward"
+        (default), from the field's frame to the next, "central", half the displacement from the frame before
+        to the one after, or "instant", the velocity. ValueError for other shapes or names, negative variances,
+        and covariances that are not symmetric or have a negative eigenvalue.
         """
     @staticmethod
     def load(path: _Path) -> FlowField:
@@ -487,9 +488,11 @@ def estimate(
 
     Parameters
     ----------
-    frames : array (T, H, W), or list, tuple or iterator of arrays (H, W)
+    frames : array (T, H, W), list, tuple or iterator of arrays (H, W), or `jacoflow.io.frames(...)`
         Oldest first, one size, at least 3 x 3 px (`coarse_to_fine` finds nothing in frames less than
-        5 px wide or high).
+        5 px wide or high). `fps` and `pixel_pitch` are by default those of the file that
+        `jacoflow.io.frames` reads, where it notes them; each field of a video is then by the time
+        between its own frames.
     ends : "nan" (default) or "drop"
         "drop" leaves out the frames at the ends that lack a neighbour: two frames give one field,
         three or more (T - 2, H, W), or (T - 1, H, W) with the time scheme "pair".

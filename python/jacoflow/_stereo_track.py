@@ -269,7 +269,7 @@ class StereoTracker:
     def update(self, left: ArrayLike, right: ArrayLike, dt: float | None = None) -> StereoStep:
         """The next step from both views, arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64, at least 17 px along each axis and as large as those before.
 
-        Pixels that are not finite leave no edges round them; views without edges give a step without clusters. Of videos, `zip(video.frames(left), video.frames(right))` makes pairs; frames that hold both views are
+        Pixels that are masked (numpy.ma) or not finite leave no edges round them; views without edges give a step without clusters. Of videos, `zip(video.frames(left), video.frames(right))` makes pairs; frames that hold both views are
         cut by `numpy.split(frame, 2, axis=1)` (side by side) or `axis=0` (top-bottom); where each was squeezed to half its width or height, disparities and motion along that axis are in squeezed pixels (the binary stretches them: `--layout half-side-by-side`).
 
         `dt`: time since the last step, in the unit of `step_time`, from a millionth to a million of it; default one ordinary step, 2 where a frame is missing. Velocities are then still for the unit of time; predictions and limits in steps refer to that time. Of the first step it means nothing.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._checks import numbers, positive_integer, positive_number, real_number
-from ._figures import axes_or_new, colour_map, frame_extent, pyplot_or_error
+from ._figures import axes_or_new, check_parts, colour_map, expect_colour, frame_extent, pyplot_or_error
 from ._jacoflow import FlowField
 from ._stereo_plot import clusters, disparity, track_graph
 
@@ -109,11 +109,12 @@ def quiver(
     """
     flow = _part(field, "flow")
     axes = axes_or_new(axes)
+    expect_colour("colour", colour)
     if flow.ndim not in (2, 3) or flow.shape[-1] != 2:
         raise ValueError(f"field: expected flow of shape (H, W, 2) or (N, 2), got {flow.shape}; index a stack first")
     x, y = _positions(field, flow.shape[:-1])
     if frame is not None:
-        axes.imshow(np.asarray(frame), cmap="gray", interpolation="nearest")
+        axes.imshow(numbers("frame", frame, "a grey frame (H, W)", (None, None)), cmap="gray", interpolation="nearest")
     if flow.ndim == 3:
         step = max(1, round(max(flow.shape[:2]) / 24)) if step is None else step
         step = positive_integer("step", step)
@@ -192,6 +193,7 @@ def overview(field: FieldLike, *, frame: NDArray[Any] | None = None, figure: Fig
     if figure is None:
         pyplot = pyplot_or_error()
         figure = pyplot.figure(figsize=(11, 8), layout="constrained")
+    check_parts("figure", figure, "matplotlib.figure.Figure", ("subplots",))
     panels = figure.subplots(2, 2)
     flow_colour(field, axes=panels[0, 0])
     quiver(field, axes=panels[0, 1], frame=frame)

@@ -139,7 +139,7 @@ class GradientTracker:
     Parameters
     ----------
     frame : array (H, W) of uint8, uint16, float32 or float64
-        The first frame, at least 16 x 16 px. Brightness is taken on the scale 0 to 255: uint16 is divided by
+        The first frame, at least 16 x 16 px. It may be masked (numpy.ma), as all frames. Brightness is taken on the scale 0 to 255: uint16 is divided by
         257 (samples of 10 to 14 bits must be shifted up first), floats are taken for shares of white unless
         at least half of what is not dark (above 0.1) exceeds 1.5, in this frame or a later one.
     bbox : (x, y, width, height), px
@@ -157,7 +157,7 @@ class GradientTracker:
     Raises
     ------
     ValueError
-        For a first frame that is too small, not two-dimensional or not finite, a box that is too small or
+        For a first frame that is too small, not two-dimensional or mostly not finite, a box that is too small or
         wholly outside, and options out of range; each message names the argument.
     TypeError
         For another dtype.
@@ -176,8 +176,9 @@ class GradientTracker:
         self._tracker = _GradientTracker(_frame(frame), box, point, _word("model", model), _word("camera", camera))
 
     def update(self, frame: ArrayLike) -> TrackResult:
-        """The target in the next frame, an array (H, W) as large as the first; a frame with NaN, infinity or
-        samples beyond 1e9 grey levels counts as one in which the target was not seen.
+        """The target in the next frame, an array (H, W) as large as the first. Where samples are masked, NaN,
+        infinite or beyond 1e9 grey levels the target is hidden; a frame with more than half of these counts as
+        one in which it was not seen.
 
         So does a frame whose still scene has nothing to do with that of the frame before (far too bright, or
         noise): nothing is learnt from it. After ten in a row the scene is taken as it is. A constant of more

@@ -9,7 +9,6 @@ use numpy::ndarray::{ArrayView, IntoDimension, ShapeBuilder};
 use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyList, PyString};
 
 /// Sample types that frames may have, for messages.
 const ACCEPTED: &str = "an array of bool, integers of 8 to 64 bits, float16, float32 or float64";
@@ -26,7 +25,7 @@ pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> Outcome<Boun
 }
 
 /// As [`as_array`], of masked arrays too, which stay masked.
-fn native<'py>(object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
+pub fn native<'py>(object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
     let py = object.py();
     let array = if let Ok(array) = object.cast::<PyUntypedArray>() {
         array.clone()
@@ -105,6 +104,27 @@ pub fn frame_with_gaps(argument: &str, object: &Bound<'_, PyAny>, colour: Colour
     converted(argument, native(object)?, colour)
 }
 
+/// As [`frame_with_gaps`], for trackers, whose thresholds are in grey levels: see [`unmasked`].
+pub fn tracked_frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
+    refuse_path(argument, object)?;
+    converted(argument, unmasked(object)?, colour)
+}
+
+/// The array with NaN for masked samples; uint8 and uint16 then become float32 with a white of 1.
+pub fn unmasked<'py>(object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
+    let array = native(object)?;
+    let white = match dtype_name(&array).as_str() {
+        "uint8" => f32::from(u8::MAX),
+        "uint16" => f32::from(u16::MAX),
+        _ => return Ok(array),
+    };
+    if !is_masked(&array)? {
+        return Ok(array);
+    }
+    let scaled = array.call_method1("astype", ("float32",))?.div(white)?;
+    Ok(scaled.cast_into::<PyUntypedArray>()?)
+}
+
 fn converted(argument: &str, array: Bound<'_, PyUntypedArray>, colour: ColourRule) -> Outcome<AnyFrame> {
     check_size(argument, &array)?;
     let array = exact_samples(argument, array)?;
@@ -155,79 +175,6 @@ fn luminance<T: Sample + Element>(
 ) -> Option<Outcome<AnyFrame>> {
     let grey = jacoflow::image::luminance(width, height, channels, &elements::<T>(array)?);
     Some(grey.map(T::grey).map_err(Raised::from))
-}
-
-/// What came as `frames`: a stack along the first axis, or a list or tuple of separate frames.
-pub struct Frames<'py> {
-    object: Bound<'py, PyAny>,
-    colour: ColourRule,
-    /// Number of frames.
-    pub count: usize,
-    /// What each is called in messages; "frames" where there are no names.
-    names: &'static [&'static str],
-}
-
-impl<'py> Frames<'py> {
-    /// Checks the outer shape; each frame is converted when it is needed, so that a long stack is never
-    /// copied whole.
-    pub fn new(object: &Bound<'py, PyAny>, colour: ColourRule) -> Outcome<Self> {
-        let is_sequence =
-            object.is_instance_of::<pyo3::types::PyList>() || object.is_instance_of::<pyo3::types::PyTuple>();
-        if is_sequence {
-            return Ok(Self { count: object.len()?, object: object.clone(), colour, names: &[] });
-        }
-        if is_iterable(object)? {
-            let list = object.try_iter()?.collect::<PyResult<Vec<_>>>()?;
-            let list = PyList::new(object.py(), list)?;
-            return Ok(Self { count: list.len(), object: list.into_any(), colour, names: &[] });
-        }
-        refuse_path("frames", object)?;
-        let array = native(object)?;
-        let shape = array.shape().to_vec();
-        let wanted = match colour {
-            ColourRule::Refuse => "a list of frames (H, W) or a stack (T, H, W)",
-            ColourRule::Luminance => "a list of frames or a stack (T, H, W) or (T, H, W, 3 or 4)",
-        };
-        let refuse = |advice: &str| {
-            let shown = shape_text(&shape);
-            let message = format!("frames: expected {wanted}, got an array of shape {shown}{advice}");
-            Err(PyValueError::new_err(message).into())
-        };
-        match shape[..] {
-            [_, rows, 3 | 4] if rows > 4 => refuse(
-                ", which looks like one colour image; pass a list of frames, or a stack (T, H, W, 3) with colour=\"luminance\"",
-            ),
-            [count, _, _] => Ok(Self { count, object: array.into_any(), colour, names: &[] }),
-            [count, _, _, 3 | 4] if colour == ColourRule::Luminance => {
-                Ok(Self { count, object: array.into_any(), colour, names: &[] })
-            }
-            [_, _, _, 3 | 4] => refuse("; for colour frames pass colour=\"luminance\""),
-            _ => refuse(""),
-        }
-    }
-
-    /// The same, of frames that are arguments of their own.
-    pub fn named(self, names: &'static [&'static str]) -> Self {
-        Self { names, ..self }
-    }
-
-    /// What frame `index` came as.
-    pub fn item(&self, index: usize) -> Outcome<Bound<'py, PyAny>> {
-        Ok(self.object.get_item(index)?)
-    }
-
-    /// Frame `index`.
-    pub fn get(&self, index: usize) -> Outcome<AnyFrame> {
-        let name = self.names.get(index).copied().unwrap_or("frames");
-        frame_with_gaps(name, &self.item(index)?, self.colour)
-    }
-}
-
-/// Whether an object has items and is no array.
-fn is_iterable(object: &Bound<'_, PyAny>) -> Outcome<bool> {
-    let is_array = object.hasattr("__array__")? || object.hasattr("__array_interface__")?;
-    let is_text = object.is_instance_of::<PyString>() || object.hasattr("__fspath__")?;
-    Ok(!is_array && !is_text && object.try_iter().is_ok())
 }
 
 /// `mask`: a boolean array `(H, W)`, true where pixels may be used.

@@ -2,7 +2,8 @@
 
 use super::samples::exact_samples;
 use super::{
-    arrays::as_array, arrays::check_size, arrays::dtype_name, arrays::elements, arrays::owned, arrays::wrong_dtype,
+    arrays::as_array, arrays::check_size, arrays::dtype_name, arrays::elements, arrays::owned, arrays::unmasked,
+    arrays::wrong_dtype,
 };
 use crate::errors::{Outcome, Raised};
 use jacoflow::error::shape_text;
@@ -13,7 +14,15 @@ use pyo3::prelude::*;
 
 /// One frame `(H, W, 3)` of red, green and blue, in a type that holds its samples exactly.
 pub fn colour_frame(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<AnyColourFrame> {
-    let array = as_array(argument, object)?;
+    converted(argument, as_array(argument, object)?)
+}
+
+/// As [`colour_frame`], of masked arrays too, for trackers: see [`unmasked`].
+pub fn colour_frame_with_gaps(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<AnyColourFrame> {
+    converted(argument, unmasked(object)?)
+}
+
+fn converted(argument: &str, array: Bound<'_, PyUntypedArray>) -> Outcome<AnyColourFrame> {
     check_size(argument, &array)?;
     let array = exact_samples(argument, array)?;
     match array.shape() {

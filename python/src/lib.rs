@@ -14,6 +14,7 @@ mod estimate;
 mod field;
 mod filters;
 mod flow_filter;
+mod frame_list;
 mod frames;
 mod gauss_markov;
 mod image;

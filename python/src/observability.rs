@@ -1,6 +1,7 @@
 //! `observability`: what theorem 1 of the patent says of every pixel.
 
-use super::arrays::{self, Frames};
+use super::arrays;
+use super::frame_list::Frames;
 use super::image::renamed;
 use super::options::{self, Object, PreprocessOptions};
 use crate::errors::Outcome;

@@ -10,7 +10,7 @@ pub use self::tables::write_tables;
 
 use self::options::Given;
 use super::arrays::{self, ColourRule};
-use super::colour_arrays::colour_frame;
+use super::colour_arrays::colour_frame_with_gaps;
 use crate::errors::Outcome;
 use crate::interrupt::{Held, interruptible};
 use jacoflow::error::Error;
@@ -93,10 +93,10 @@ fn coloured(object: &Bound<'_, PyAny>, takes_grey: bool) -> Outcome<AnyColourFra
     fn grey<T: Copy>(frame: &Frame<T>) -> Frame<[T; 3]> {
         frame.map(|&value| [value; 3])
     }
-    if !(takes_grey && arrays::as_array("frame", object)?.ndim() == 2) {
-        return colour_frame("frame", object);
+    if !(takes_grey && arrays::unmasked(object)?.ndim() == 2) {
+        return colour_frame_with_gaps("frame", object);
     }
-    Ok(match arrays::frame("frame", object, ColourRule::Refuse)? {
+    Ok(match arrays::tracked_frame("frame", object, ColourRule::Refuse)? {
         AnyFrame::U8(frame) => AnyColourFrame::U8(grey(&frame)),
         AnyFrame::U16(frame) => AnyColourFrame::U16(grey(&frame)),
         AnyFrame::F32(frame) => AnyColourFrame::F32(grey(&frame)),

@@ -3,13 +3,14 @@
 use super::arrays::{self, ColourRule};
 use super::{field::FlowField, options::Integer, options::count, options::named};
 use crate::errors::Outcome;
+use crate::image::renamed;
 use crate::interrupt::interruptible;
 use crate::keywords::getters;
 use jacoflow::error::Error;
 use jacoflow::parallel::Threads;
 use jacoflow::synth::registry::{CARRIERS, Parameter, SCENES};
 use jacoflow::synth::{Rounding, Scene as CoreScene, SceneOptions, Sensor as CoreSensor, build, mean_truth, truth};
-use pyo3::exceptions::PyMemoryError;
+use pyo3::exceptions::{PyMemoryError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict, PyTuple};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -62,9 +63,16 @@ impl Scene {
         parameters: Option<&Bound<'_, PyDict>>,
     ) -> Outcome<Self> {
         let default = SceneOptions::default();
-        let values = parameters.map_or(Ok(Vec::new()), |parameters| {
-            parameters.iter().map(|(name, value)| Ok((name.extract()?, value.extract()?))).collect::<Outcome<_>>()
-        })?;
+        let parameter = |(name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| -> Outcome<(String, f64)> {
+            let name: String = name.extract()?;
+            match value.extract() {
+                Ok(number) => Ok((name, number)),
+                Err(_) => {
+                    Err(PyTypeError::new_err(format!("{name}: expected a number, got {}", value.get_type())).into())
+                }
+            }
+        };
+        let values = parameters.iter().flat_map(|given| given.iter()).map(parameter).collect::<Outcome<_>>()?;
         let options = SceneOptions {
             width: width.map_or(Ok(default.width), |n| count("width", n))?,
             height: height.map_or(Ok(default.height), |n| count("height", n))?,
@@ -73,7 +81,7 @@ impl Scene {
             carrier,
             values,
         };
-        let core = build(&name, &options)?;
+        let core = build(&name, &options).map_err(|error| renamed(error, "scene", "name"))?;
         Ok(Self { kind: name, options, core })
     }
 

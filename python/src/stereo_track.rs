@@ -63,8 +63,8 @@ impl PyStereoTracker {
     ) -> Outcome<Bound<'py, PyDict>> {
         let py = left.py();
         let views = [
-            arrays::frame("left", left, ColourRule::Luminance)?,
-            arrays::frame("right", right, ColourRule::Luminance)?,
+            arrays::tracked_frame("left", left, ColourRule::Luminance)?,
+            arrays::tracked_frame("right", right, ColourRule::Luminance)?,
         ];
         let step = self
             .0
@@ -81,8 +81,8 @@ impl PyStereoTracker {
         dt: Option<f64>,
     ) -> Outcome<Bound<'py, PyDict>> {
         let py = left.py();
-        let left = arrays::frame("left", left, ColourRule::Luminance)?;
-        let disparity = match arrays::frame("disparity", disparity, ColourRule::Refuse)? {
+        let left = arrays::tracked_frame("left", left, ColourRule::Luminance)?;
+        let disparity = match arrays::tracked_frame("disparity", disparity, ColourRule::Refuse)? {
             map @ (AnyFrame::F32(_) | AnyFrame::F64(_)) => map.to_real::<f32>(),
             other => {
                 let message = format!("disparity: expected an array of float32 or float64, got {}", other.dtype());

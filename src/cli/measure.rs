@@ -1,4 +1,4 @@
-//! `jacoflow measure`: derived quantities of a region or of points, as rows with standard deviations.
+//! `jacoflow measure`: motion and derived quantities of a region or of points, with standard deviations.
 
 use super::arguments::{ComputeArguments, GridArguments, InputArguments, MessageArguments, MethodArguments};
 use super::flow::{Prepared, prepare_with_covariance};
@@ -7,7 +7,7 @@ use super::open::{open_input, refuse_inputs};
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow, table_target};
 use crate::error::{Error, Result};
-use crate::flow::derived::Quantity;
+use crate::flow::derived::Measured;
 use crate::pipeline::{MeasuredRegion, Measurements};
 use crate::types::Region;
 use clap::Args;
@@ -22,8 +22,8 @@ use std::path::{Path, PathBuf};
     motion is fitted to the valid estimates that follow it, a share of them; the status is no_dominant_motion and the value NaN where\n\
     that is half of them or less. std knows of their errors, their overlap and their scatter. With --points every point has its rows.\n\
     Rates are per second where the frame rate is known (--fps, or the file), else per frame; rpm needs it.\n\n\
-    Quantities: divergence, curl, shear_magnitude, shear_axis, strain_xx, strain_xy, strain_yy, angular_velocity, rpm,\n\
-    rotation_centre_x, rotation_centre_y, centre_distance, time_to_contact, speed\n\n\
+    Quantities: u, v, u_x, v_x, u_y, v_y, divergence, curl, shear_magnitude, shear_axis, strain_xx, strain_xy, strain_yy, angular_velocity, rpm,\n\
+    rotation_centre_x, rotation_centre_y, centre_distance, time_to_contact, speed (u and v of a region: at its centre, or --at)\n\n\
     Examples:\n  \
     jacoflow measure disc.y4m --quantity rpm,rotation_centre_x,rotation_centre_y --region 100,60,64,64 --fps 100\n  \
     jacoflow measure drive/ --quantity time_to_contact --region 500,150,200,120 --fps 10 -o ttc.csv"
@@ -62,8 +62,8 @@ pub struct MeasureCommand {
 impl MeasureCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
-        let quantities: Vec<Quantity> =
-            self.quantity.iter().map(|name| Quantity::parse(&name.replace('-', "_"))).collect::<Result<_>>()?;
+        let quantities: Vec<Measured> =
+            self.quantity.iter().map(|name| Measured::parse(&name.replace('-', "_"))).collect::<Result<_>>()?;
         let output = [("output", self.output.as_deref())];
         refuse_inputs(self.input.input.iter().map(Path::new), &output, self.force)?;
         let target = table_target(self.output.as_deref(), self.force, self.messages.json)?;

@@ -86,7 +86,7 @@ impl Neighbourhood {
         if let Some(sigma) = self.sigma()
             && !(sigma.is_finite() && sigma > 0.0)
         {
-            return Err(Error::argument("neighbourhood", "a positive, finite sigma in px", sigma));
+            return Err(Error::argument("neighbourhood_sigma", "a positive, finite number of px", sigma));
         }
         match self {
             Self::Rectangle { width, height, .. } => {

@@ -15,6 +15,9 @@ use std::sync::Arc;
 /// a lost frame doubles a step, clocks of cameras jitter by some per cent.
 const UNEVEN_STEPS: f64 = 0.2;
 
+/// What some containers of video (Matroska, WebM) round times to, s.
+const TICK: f64 = 1e-3;
+
 /// What the frames of a stream pass through, checked.
 #[derive(Debug, Clone)]
 pub struct StreamPlan {
@@ -163,15 +166,19 @@ impl<T: SimdReal> FlowStream<T> {
         Ok(Some(field))
     }
 
-    /// Seconds from frame `k` of the ring to the next.
+    /// Seconds from frame `k` of the ring to the next: the nominal ones where times differ by rounding.
     fn step(&self, k: usize) -> Option<f64> {
-        Some((*self.times.get(k + 1)?)? - (*self.times.get(k)?)?)
+        let times = [(*self.times.get(k)?)?, (*self.times.get(k + 1)?)?];
+        let step = times[1] - times[0];
+        let is_rounded = times.iter().all(|time| ((time / TICK).round() * TICK - time).abs() < 1e-3 * TICK);
+        let nominal = self.plan.estimator.options().units.frame_period.filter(|_| is_rounded);
+        Some(nominal.filter(|period| (step - period).abs() < TICK.min(0.5 * period)).unwrap_or(step))
     }
 
     /// Gives a field whose flow begins at frame `k` of the ring the period of its own frames.
     fn set_period(&self, field: &mut FlowField<T>, k: usize) {
-        let (first, last) = (self.times.front().copied().flatten(), self.times.back().copied().flatten());
-        let mean = || Some((last? - first?) / (self.times.len().max(2) - 1) as f64);
+        let steps = self.times.len().saturating_sub(1);
+        let mean = || Some((0..steps).map(|k| self.step(k)).sum::<Option<f64>>()? / steps.max(1) as f64);
         let period = if field.layout.interval == Interval::Forward { self.step(k) } else { mean() };
         if period.is_some() {
             field.convert(Units { frame_period: period, ..field.layout.units.clone() });

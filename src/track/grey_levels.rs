@@ -36,6 +36,11 @@ pub struct GreyLevels {
 }
 
 impl GreyLevels {
+    /// As long as no frame of floats has come: their white is taken for 1.
+    pub fn of_integers() -> Self {
+        Self { float: 255.0 }
+    }
+
     /// Decides by the first frame of a sequence.
     pub fn decide(first: &AnyFrame) -> Self {
         Self::decide_together(std::slice::from_ref(first))
@@ -44,7 +49,7 @@ impl GreyLevels {
     /// Decides by frames of one moment, such as two views: grey levels if one of floats holds them, for the
     /// others' types say what white is.
     pub fn decide_together(frames: &[AnyFrame]) -> Self {
-        Self { float: 255.0 }.revised(frames)
+        Self::of_integers().revised(frames)
     }
 
     /// The same after later frames of the sequence, which may show that floats are grey levels after all.

@@ -1,6 +1,6 @@
 //! One affine motion for a whole region, from the estimates of its sites.
 
-use jacoflow::flow::derived::{Quantity, RegionMotion, RegionStatus, fit_region, measure};
+use jacoflow::flow::derived::{Measured, Quantity, RegionMotion, RegionStatus, fit_region};
 use jacoflow::math::random::CounterRng;
 use jacoflow::types::{FieldLayout, FlowField, Interval, MOTION_NAMES, Rect, SamplingGrid, Status, Units};
 use nalgebra::{Matrix6, Vector6};
@@ -113,7 +113,9 @@ fn two_motions(edge: usize) -> FlowField<f64> {
 
 #[test]
 fn the_motion_of_most_sites_is_found_and_that_around_a_pixel() {
-    let curl = |found: &RegionMotion, field: &FlowField<f64>| measure(field, Quantity::Curl, found).unwrap();
+    let curl = |found: &RegionMotion, field: &FlowField<f64>| {
+        Measured::Derived(Quantity::Curl).of_region(field, found).unwrap()
+    };
     let mostly = two_motions(4);
     let found = fitted(&mostly);
     let (value, std) = curl(&found, &mostly);

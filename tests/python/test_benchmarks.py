@@ -92,8 +92,9 @@ def test_controlled_scenes_have_the_speed_asked_for_and_exact_truth():
 
     pairs = ((2, False, 0.0, 0.0, (0, 1)), (2, False, 0.5, 0.5, (-0.5, 0.5)))
     triples = ((3, False, 0.0, 0.0, (-1, 1)), (3, True, 0.0, 0.0, (0, 1)))
+    truths = {(t, between): case.scene().truth(t, between=between) for *_, t, between in (*pairs, *triples)}
     for frames, forward, moment, t, between in (*pairs, *triples):
-        truth = case.scene().truth(t, between=between)
+        truth = truths[t, between]
         answer = truth.flow, truth.jacobian
         contestant = controlled.Contestant("exact", knows, frames=frames, moment=moment, forward=forward)
         assert contestant.errors(case) == (0.0, 1.0, 0.0)

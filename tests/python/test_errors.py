@@ -59,7 +59,7 @@ def test_frames_that_cannot_be_used(frames, error, message, method):
         ({"neighbourhood": (0, 3), "method": "windowed"}, ValueError, "neighbourhood: expected a positive integer"),
         ({"neighbourhood": [[0, 0], [1, 0], [0, 1]], "method": "instantaneous"}, ValueError, "neighbourhood: "),
         ({"neighbourhood": "big", "method": "windowed"}, ValueError, "neighbourhood: "),
-        ({"neighbourhood_sigma": -1.0, "method": "windowed"}, ValueError, "neighbourhood: "),
+        ({"neighbourhood_sigma": -1.0, "method": "windowed"}, ValueError, "neighbourhood_sigma: "),
         ({"window_sigma": 0.0, "method": "windowed"}, ValueError, "window_sigma: "),
         ({"rows": "some", "method": "windowed"}, ValueError, "rows: "),
         ({"rank_deficient": "guess", "method": "windowed"}, ValueError, "rank_deficient: "),
@@ -208,7 +208,7 @@ def test_exceptions_have_one_base_and_pickle():
 
 @pytest.mark.parametrize("what", ["nothing", "disc disc"])
 def test_unknown_scenes_are_listed(what):
-    with pytest.raises(ValueError, match="scene: expected one of ramp"):
+    with pytest.raises(ValueError, match="name: expected one of ramp"):
         scenes.Scene(what)
     with pytest.raises(ValueError, match="parameter: expected one of"):
         scenes.Scene("affine", wind=1.0)

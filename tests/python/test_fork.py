@@ -1,7 +1,7 @@
 """A process that was forked, or begun in another way, computes as its parent does: nothing waits for threads or locks that stayed behind."""
 
 import concurrent.futures
-import hashlib
+import functools
 import multiprocessing
 import multiprocessing.pool
 import os
@@ -18,6 +18,7 @@ import jacoflow
 from benchmarks.scenes import motion3d as motion3d_scenes
 from benchmarks.scenes import stereo as stereo_scenes
 from conftest import METHODS
+from fork_support import digest, field, report, results, sequence
 import jacoflow.reference
 from jacoflow import motion3d, scenes, stereo, track
 
@@ -32,11 +33,6 @@ def quietly(begin):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         return begin()
-
-
-def digest(*arrays):
-    """A fingerprint of every bit."""
-    return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).digest()
 
 
 def in_child(work):
@@ -63,21 +59,6 @@ def in_child(work):
     assert answered, "the child does not answer"
     assert status == 0
     return answer
-
-
-def sequence(count=3):
-    """Frames so large that their work is split between threads."""
-    return scenes.Scene("affine", width=320, height=240, random_state=4).frames(count)
-
-
-def field(method="instantaneous", **options):
-    return jacoflow.estimate(sequence(), method=method, **options, ends="drop")
-
-
-def results(threads):
-    """A fingerprint of what takes little time."""
-    found = field(threads=threads)
-    return digest(jacoflow.smooth(sequence()[0], 1.5, threads=threads), found.flow, found.jacobian)
 
 
 @needs_fork
@@ -138,9 +119,20 @@ def tracked():
     return found.box, found.displacement
 
 
+@functools.cache
+def stereo_steps():
+    return stereo_scenes.small().sequence(range(3))
+
+
+@functools.cache
+def windowed_field():
+    """What others are derived from."""
+    return field("windowed")[0]
+
+
 def stereo_tracked():
     tracker = track.StereoTracker(disparity_range=(-20, 12))
-    for step in stereo_scenes.small().sequence()[:3]:
+    for step in stereo_steps():
         tracker.update(step.left, step.right)
     return (np.frombuffer(tracker.graph.to_json().encode(), np.uint8),)
 
@@ -153,13 +145,13 @@ def people(mode):
 
 
 def matched(method):
-    step = stereo_scenes.small().sequence()[0]
+    step = stereo_steps()[0]
     found = stereo.edge_disparity(step.left, step.right, disparity_range=(-20, 12), row_range=(-2, 2), method=method)
     return found.disparity, found.values
 
 
 def row_offset():
-    step = stereo_scenes.small().sequence()[0]
+    step = stereo_steps()[0]
     return (np.array(stereo.estimate_row_offset(step.left, step.right, disparity_range=(-20, 12))),)
 
 
@@ -176,7 +168,7 @@ def bound():
 
 def moved_before_a_field(patches):
     camera = np.array([[300.0, 0, 160], [0, 300, 120], [0, 0, 1]])
-    windowed = field("windowed")[0]
+    windowed = windowed_field()
     found, points = motion3d.estimate_field_motion(windowed, camera, patches=patches)
     return found.rotation, points, *motion3d.time_to_contact_map(windowed, found, camera)
 
@@ -188,7 +180,7 @@ def mixed():
 
 
 def derived():
-    windowed = field("windowed")[0]
+    windowed = windowed_field()
     values = [windowed.value(name) for name in ("divergence", "shear_magnitude", "rotation_centre_x")]
     return *values, windowed.std("divergence"), windowed.advect([[50.0, 60.0]])
 
@@ -232,7 +224,8 @@ def filtered():
 
 
 def observable():
-    found = jacoflow.observability(sequence())
+    # Fewer rows, that many threads still share.
+    found = jacoflow.observability(sequence()[:, :96])
     return (found.condition, found.condition_number)
 
 
@@ -268,11 +261,6 @@ CALLS = {
 def test_everything_that_computes_does_so_in_a_child(name):
     before = digest(*CALLS[name]())
     assert in_child(lambda: digest(*CALLS[name]())) == before
-
-
-def report(connection, threads):
-    """In another process: sends its results."""
-    connection.send(results(threads))
 
 
 @pytest.mark.parametrize("threads", [1, 2])

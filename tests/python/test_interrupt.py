@@ -11,13 +11,13 @@ BEGIN = """
 import os, signal, sys, threading
 import numpy as np
 import jacoflow
-from jacoflow import io, mixture, motion3d, stereo, track
+from jacoflow import io, track
 
 signal.signal(signal.SIGINT, signal.default_int_handler)
 texture = np.random.default_rng(0).integers(0, 256, (1300, 1700)).astype(np.uint8)
 
 def stopped(call):
-    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
     try:
         call()
     except KeyboardInterrupt:
@@ -41,12 +41,15 @@ ENDLESS = {
 }
 
 
-@pytest.mark.parametrize("name", ENDLESS)
-def test_work_without_end_stops(name):
+def test_work_without_end_stops():
+    """One after the other in a process, which goes on working."""
     run(f"""
+        from jacoflow import mixture
         points = np.random.default_rng(0).normal(size=(4000, 3))
-        assert stopped(lambda: {ENDLESS[name]})
-        assert mixture.VariationalGaussianMixture(2, max_iter=3, random_state=0).fit(points).means_.shape == (2, 3)
+        calls = {{{", ".join(f"{name!r}: lambda: {call}" for name, call in ENDLESS.items())}}}
+        for name, call in calls.items():
+            assert stopped(call), name
+            assert mixture.VariationalGaussianMixture(2, max_iter=3, random_state=0).fit(points).means_.shape == (2, 3)
     """)
 
 
@@ -80,13 +83,14 @@ def test_an_estimate_stops_and_its_estimator_begins_anew():
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
-@pytest.mark.parametrize("call", ["io.frames(pipe)", "jacoflow.FlowField.load(pipe)", "io.read_image(pipe)", "io.read_disparity(pipe)"])
-def test_a_pipe_that_nobody_writes_to_is_left(call, tmp_path):
-    pipe = tmp_path / ("pipe.y4m" if "frames" in call else "pipe.pfm")
-    os.mkfifo(pipe)
+def test_pipes_that_nobody_writes_to_are_left(tmp_path):
+    names = {"io.frames": "frames.y4m", "jacoflow.FlowField.load": "field.pfm", "io.read_image": "image.pfm", "io.read_disparity": "disparity.pfm"}
+    for name in names.values():
+        os.mkfifo(tmp_path / name)
     run(f"""
-        pipe = {str(pipe)!r}
-        assert stopped(lambda: {call})
+        calls = {{{", ".join(f"{call!r}: lambda: {call}({str(tmp_path / name)!r})" for call, name in names.items())}}}
+        for name, call in calls.items():
+            assert stopped(call), name
     """)
 
 

@@ -174,20 +174,21 @@ def test_few_points_that_stand_still_are_reported(turn):
 
 
 HARD = {
-    "long lens, half width .15 to .2": 60,
-    "a thing that moves by itself, robust": 100,
-    "20 to 60 points, outliers, noise not told": 60,
-    "6 patches with Jacobians": 60,
-    "30 patches with Jacobians": 60,
+    "long lens, half width .15 to .2": (150, 0.3),
+    "a thing that moves by itself, robust": (120, 0.5),
+    "20 to 60 points, outliers, noise not told": (200, 0.3),
+    "6 patches with Jacobians": (200, 0.3),
+    "30 patches with Jacobians": (200, 0.3),
 }
-"""Rows of the benchmark, and how many of 200 scenes are `ok` at least. Ten patches are estimated as six are."""
+"""Rows of the benchmark, numbers of scenes, and the share that is `ok` at least. Ten patches are estimated as six are."""
 
 
 @pytest.mark.parametrize("name", HARD)
 def test_covariances_hold_where_they_are_hard_to_state(name):
     (make,) = (kinds[name] for kinds in coverage.CASES.values() if name in kinds)
-    row = coverage.row(name, map(make, range(200)))
-    assert row["ok"] >= HARD[name] and row["wrong"] <= 2 and 0.87 <= row["ellipsoid"] <= 0.98, row
+    trials, least = HARD[name]
+    row = coverage.row(name, map(make, range(trials)))
+    assert row["ok"] >= least * trials and row["wrong"] <= 0.01 * trials and 0.87 <= row["ellipsoid"] <= 0.98, row
 
 
 def test_what_is_said_of_scenes_by_chance_holds():
@@ -200,8 +201,8 @@ def test_what_is_said_of_scenes_by_chance_holds():
 
 def test_a_robust_search_says_as_much_of_scenes_by_chance():
     """So few are not counted by class; `benchmarks.tables.motion3d_honesty --robust` has thousands."""
-    *_, everything = honesty.table(300, robust=True)
-    assert everything["ok"] > 250 and everything["wrong"] == 0 and everything["holds"] > 0.9, everything
+    *_, everything = honesty.table(240, robust=True)
+    assert everything["ok"] > 200 and everything["wrong"] == 0 and everything["holds"] > 0.9, everything
 
 
 def test_times_on_the_sphere_times_the_bearings_z_reach_the_camera_plane():

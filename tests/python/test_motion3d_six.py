@@ -33,7 +33,7 @@ def test_two_exact_patches_are_enough():
     assert np.median(errors) < 1e-2
 
 
-@pytest.mark.parametrize("case", [1, 3, 4])
+@pytest.mark.parametrize("case", [1, 3])
 def test_six_numbers_on_layouts_with_the_published_bounds(case):
     """Shrunk slants and flow alone within a fifth of the published figures; six numbers worse without shrinking where patches are small."""
     h, n, radius, noise_std, asked = six.SIX[case]

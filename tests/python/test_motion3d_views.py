@@ -63,3 +63,21 @@ def test_covariances_hold_in_fast_turns(robust):
     """The flow placed half way has ellipsoids of which none or few hold (`claims.turning`)."""
     row = coverage.row("", (coverage.turns(seed, 0.25, robust) for seed in range(150)))
     assert row["ok"] > 120 and 0.88 <= row["ellipsoid"] <= 0.985 and row["median, deg"] < 0.9, row
+
+
+def test_directions_in_narrow_fields_are_as_unsure_as_they_say():
+    rng = np.random.default_rng(7)
+    half, n, off = np.tan(np.radians(1.0)), 100, []
+    for _ in range(40):
+        points = rng.uniform(-half, half, (n, 2))
+        u, w = rng.normal(size=3), 0.25 * rng.normal(size=3)
+        u /= np.linalg.norm(u)
+        flow = motion3d.predict_flow(points, u, w, rng.uniform(1, 3, n))
+        noise_std = 0.1 * np.median(np.linalg.norm(flow - flow.mean(0), axis=1))
+        found = motion3d.estimate_motion(points, flow + noise_std * rng.normal(size=(n, 2)), noise_std=noise_std, placement="start")
+        if found.status == "ill_conditioned" and np.isfinite(found.direction_std):
+            off.append(np.degrees(np.arccos(np.clip(found.translation @ u, -1, 1))) / found.direction_std)
+    assert len(off) > 30
+    # The opposite direction explains some of them nearly as well.
+    assert np.mean(np.array(off) > 4) <= 0.03
+    assert np.mean(np.array(off) > 2) <= 0.1

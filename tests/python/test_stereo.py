@@ -19,7 +19,7 @@ RANGE = (-20, 12)
 @cache
 def small():
     """Some steps of the small scene."""
-    return [stereo_scenes.small().sequence()[t] for t in (0, 2, 4)]
+    return stereo_scenes.small().sequence(range(5))[::2]
 
 
 def disparity(left, right, **options):
@@ -52,7 +52,7 @@ ASKED = {
 @cache
 def some_steps(name):
     """Some steps of a scene."""
-    return small() if name == "small" else stereo_scenes.SCENES[name]().sequence((0, 5, 10, 15) if name == "crossing" else (0, 3, 6, 9))
+    return small() if name == "small" else stereo_scenes.SCENES[name]().sequence((5, 15) if name == "crossing" else (3, 9))
 
 
 @pytest.mark.parametrize(("scene", "method", "support"), ASKED)

@@ -279,3 +279,17 @@ def test_the_binary_reads_the_same(tmp_path):
     plain = run("flow", str(path), "--channel", "0", "--method", "windowed", "--fps", "1", "--pixel-pitch", "1", "-o", str(out), "--force")
     assert plain.returncode == 0 and "as the file says" not in plain.stderr
     assert io.read_npz(sorted(out.iterdir())[0]).pixel_pitch == (1.0, 1.0)
+
+
+def test_estimate_takes_the_units_that_the_file_notes(tmp_path):
+    path = tmp_path / "stack.tif"
+    tifffile.imwrite(path, STACK, imagej=True, resolution=(4, 2), metadata={"axes": "TYX", "finterval": 0.25, "unit": "micron"})
+    field = jacoflow.estimate(io.frames(path), method="windowed")
+    assert (field.frame_period, field.pixel_pitch, field.length_unit) == (0.25, (0.25, 0.5), "µm")
+    plain = jacoflow.estimate(STACK, method="windowed")
+    assert plain.frame_period is None
+    assert_allclose(field.flow, plain.flow * np.array([0.25, 0.5]) / 0.25, rtol=1e-6)
+    other = jacoflow.estimate(io.frames(path), method="windowed", fps=1, pixel_pitch=(2.0, 3.0), length_unit="mm")
+    assert (other.frame_period, other.pixel_pitch, other.length_unit) == (1.0, (2.0, 3.0), "mm")
+    half = jacoflow.estimate(io.frames(path, step=2), method="windowed")
+    assert half.frame_period == 0.5

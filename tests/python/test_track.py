@@ -66,7 +66,8 @@ def test_uncertainty_holds_the_error(scene):
 
 def test_frames_that_cannot_be_used_are_missed(scene):
     frames = scene.frames()[:20].astype(np.float32)
-    frames[8, 3, 5] = np.nan
+    frames[7, 3, 5] = np.nan
+    frames[8, : frames.shape[1] * 3 // 5] = np.nan
     frames[9] = np.inf
     found = track.track(frames, scene.start_box)
     assert_array_equal(found.status[8:10], "coasting")

@@ -39,7 +39,7 @@ def test_a_small_target_comes_out_again_from_behind_a_bar(options, seeds):
 
 @pytest.mark.parametrize("kind", ["fractal:1,90,30", "smooth:4,90,20"])
 @pytest.mark.parametrize(
-    ("level", "bar_level"), [(200.0, 40.0), (200.0, 90.0), (200.0, 110.0), (200.0, 250.0), (150.0, 40.0), (160.0, 250.0), (140.0, 220.0), (20.0, 90.0), (20.0, 150.0), (20.0, 250.0)]
+    ("level", "bar_level"), [(200.0, 40.0), (200.0, 90.0), (140.0, 220.0), (20.0, 90.0), (20.0, 250.0)]
 )
 def test_bars_and_targets_of_any_brightness(level, bar_level, kind):
     """Dark and bright targets behind bars that are darker, brighter, or as bright as the background: each of six backgrounds is gone through."""

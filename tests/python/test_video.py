@@ -101,11 +101,11 @@ def test_missing_pyav_says_how_to_get_it(clip, monkeypatch):
         video.frames(clip)
 
 
-def encode(path, codec, pix_fmt, images, layout, *, milliseconds=None, rotation=None):
+def encode(path, codec, pix_fmt, images, layout, *, milliseconds=None, rotation=None, rate=RATE):
     """Writes `images`, arrays in `layout`, as a video; `milliseconds`: times of the frames."""
     frames = [av.VideoFrame.from_ndarray(image, format=layout) for image in images]
     with av.open(str(path), "w") as container:
-        stream = container.add_stream(codec, rate=RATE)
+        stream = container.add_stream(codec, rate=rate)
         stream.width, stream.height, stream.pix_fmt = frames[0].width, frames[0].height, pix_fmt
         if rotation is not None:
             stream.set_display_rotation(rotation)
@@ -220,3 +220,36 @@ def test_the_program_ffmpeg_gives_the_same_frames(clip, monkeypatch, tmp_path):
         for (time, frame), (other_time, other) in zip(with_pyav, with_program, strict=True):
             assert time == pytest.approx(other_time, abs=1e-3), path
             np.testing.assert_array_equal(frame, other, str(path))
+
+
+def walking(positions):
+    """A texture that moves right by whole pixels."""
+    wide = np.random.default_rng(2).uniform(0, 200, (HEIGHT, WIDTH + 40))
+    for axis in (0, 1):
+        wide = sum(np.roll(wide, k, axis) for k in (-1, 0, 1)) / 3
+    return [np.ascontiguousarray(wide[:, 30 - x : 30 - x + WIDTH]).astype(np.uint8) for x in positions]
+
+
+def test_estimate_goes_by_the_times_of_the_frames(tmp_path):
+    milliseconds = [0, 40, 80, 160, 200, 240]
+    path = encode(tmp_path / "vfr.mkv", "ffv1", "gray", walking([0, 1, 2, 4, 5, 6]), "gray", milliseconds=milliseconds)
+    stack = jacoflow.estimate(io.frames(path))
+    inside = (slice(12, -12), slice(12, -12))
+    speeds = [np.median(field.u[inside]) for field in stack[:-1]]
+    np.testing.assert_allclose(speeds, 25, rtol=0.01)
+    assert [field.frame_period for field in stack[:-1]] == pytest.approx([0.04, 0.04, 0.08, 0.04, 0.04])
+    # Lengths of steps are those of a field's own frames.
+    again = pickle.loads(pickle.dumps(stack))
+    np.testing.assert_array_equal(again[2].advect([[20.0, 20.0]]), stack[2].advect([[20.0, 20.0]]))
+    assert stack[2].advect([[20.0, 20.0]])[0, 0] == pytest.approx(22, abs=0.1)
+    given = jacoflow.estimate(io.frames(path), fps=10)
+    assert {field.frame_period for field in given} == {0.1}
+
+
+def test_rounded_times_of_an_even_rate_are_even(tmp_path):
+    milliseconds = [round(1000 * k / 30) for k in range(5)]
+    path = encode(tmp_path / "even.mkv", "ffv1", "gray", walking(range(5)), "gray", milliseconds=milliseconds, rate=30)
+    reader = io.frames(path)
+    rate = reader.frame_rate
+    assert rate == pytest.approx(30)
+    assert {field.frame_period for field in jacoflow.estimate(reader)} == {1 / rate}

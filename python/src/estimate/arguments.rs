@@ -1,11 +1,13 @@
 //! The options of `estimate` and `FlowEstimator`, and the core's options that they mean.
 
 use crate::errors::Outcome;
+use crate::frame_list::Noted;
 use crate::options::{self, Group, Integer, Object, PreprocessOptions};
 use crate::{arrays, image::renamed, io::flow_image, keywords::keep_options, keywords::with_common};
 use jacoflow::flow::{Estimator, EstimatorOptions, InitialFlow, METHODS, Method, MethodInfo, MethodSettings, PAIR};
 use jacoflow::temporal::{AnyFlowStream, RecursiveOptions, StreamPlan};
 use pyo3::prelude::*;
+use pyo3::types::PyFloat;
 use std::sync::Arc;
 
 /// Hands the options of an estimator to `$then!`.
@@ -58,6 +60,20 @@ impl Arguments {
             .map_err(|e| renamed(e, "presmooth", "smooth"))?;
         let precision = options::precision(self.precision.as_deref())?;
         Ok(AnyFlowStream::new(StreamPlan::new(estimator, steps, recursive)?, precision))
+    }
+
+    /// Takes the units that a file notes where no option gives them; returns the times of its frames, s,
+    /// empty where they are unknown or `fps` replaces them.
+    pub fn take_units<'a>(&mut self, py: Python<'_>, noted: &'a Noted) -> Outcome<&'a [f64]> {
+        if let (None, Some((pitch, unit))) = (&self.pixel_pitch, &noted.pixel_size) {
+            self.pixel_pitch = Some(pitch.into_pyobject(py)?.into_any().unbind());
+            self.length_unit = self.length_unit.take().or_else(|| unit.clone());
+        }
+        if self.fps.is_some() {
+            return Ok(&[]);
+        }
+        self.fps = noted.frame_rate.map(|rate| PyFloat::new(py, rate).into_any().unbind());
+        Ok(&noted.times)
     }
 
     /// What is done with colour.

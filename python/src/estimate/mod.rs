@@ -3,12 +3,13 @@
 mod arguments;
 mod stream;
 
-use super::arrays::Frames;
 use super::field::{FlowField, Packed};
 use super::keywords::with_common;
 use super::options::{Integer, Object};
 use super::progress::Reporter;
 use crate::errors::Outcome;
+use crate::frame_list::Frames;
+use crate::image::renamed;
 use crate::interrupt::interruptible;
 use arguments::{Arguments, estimator_options};
 use jacoflow::error::Error;
@@ -104,7 +105,7 @@ fn check_count(frames: &Frames<'_>, stream: &AnyFlowStream) -> Outcome<()> {
 /// The fields of a whole sequence.
 fn run(
     py: Python<'_>,
-    frames: &Frames<'_>,
+    (frames, times): (&Frames<'_>, &[f64]),
     (stream, ends): (&mut AnyFlowStream, Ends),
     progress: &Reporter<'_>,
 ) -> Outcome<FlowField> {
@@ -113,7 +114,9 @@ fn run(
     let mut last = None;
     for index in 0..frames.count {
         let frame = frames.get(index)?;
-        let mut field = interruptible(py, || stream.push_at(frame, None))?;
+        let time = times.get(index).copied();
+        let mut field =
+            interruptible(py, || stream.push_at(frame, time).map_err(|error| renamed(error, "time", "frames")))?;
         if ends == Ends::Missing && index == 1 && field.is_none() {
             field = interruptible(py, || stream.first_step())?;
         }
@@ -150,9 +153,11 @@ macro_rules! define_estimate {
         ///
         /// Parameters
         /// ----------
-        /// frames : array (T, H, W), or list, tuple or iterator of arrays (H, W)
+        /// frames : array (T, H, W), list, tuple or iterator of arrays (H, W), or `jacoflow.io.frames(...)`
         ///     Oldest first, one size, at least 3 x 3 px (`coarse_to_fine` finds nothing in frames less than
-        ///     5 px wide or high).
+        ///     5 px wide or high). `fps` and `pixel_pitch` are by default those of the file that
+        ///     `jacoflow.io.frames` reads, where it notes them; each field of a video is then by the time
+        ///     between its own frames.
         /// ends : "nan" (default) or "drop"
         ///     "drop" leaves out the frames at the ends that lack a neighbour: two frames give one field,
         ///     three or more (T - 2, H, W), or (T - 1, H, W) with the time scheme "pair".
@@ -267,11 +272,12 @@ struct Kind {
 fn estimate_sequence(
     frames: &Bound<'_, PyAny>,
     kind: Kind,
-    arguments: Arguments,
+    mut arguments: Arguments,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> Outcome<FlowField> {
     let py = frames.py();
     let frames = Frames::new(frames, arguments.colour(py)?)?;
+    let times = arguments.take_units(py, &frames.noted)?;
     let mut stream = arguments.stream(py, kind.is_pairs || frames.count <= 2)?;
     let mut ends = kind.ends;
     if kind.is_pairs {
@@ -282,7 +288,7 @@ fn estimate_sequence(
         stream = AnyFlowStream::new(stream.plan().clone().of_pairs()?, stream.precision());
         ends = Ends::Dropped;
     }
-    run(py, &frames, (&mut stream, ends), &Reporter::new(py, progress)?)
+    run(py, (&frames, times), (&mut stream, ends), &Reporter::new(py, progress)?)
 }
 
 /// What `flow` does.

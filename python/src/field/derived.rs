@@ -1,9 +1,8 @@
 //! Parameters and derived quantities by name.
 
-use super::measurement::Measured;
 use crate::errors::Outcome;
 use jacoflow::error::{Error, Result};
-use jacoflow::flow::derived::{Aggregate, Quantity, parameter_mean, plane, planes, region_mean};
+use jacoflow::flow::derived::{Aggregate, Measured, Quantity, parameter_mean, plane, planes, region_mean};
 use jacoflow::math::Real;
 use jacoflow::types::{FieldLayout, FlowField, MOTION_NAMES, Region, Units};
 use pyo3::prelude::*;

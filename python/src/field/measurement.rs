@@ -2,7 +2,7 @@
 
 use crate::arrays;
 use crate::errors::Outcome;
-use jacoflow::flow::derived::{Quantity, RegionMotion, RegionStatus, fit_region, measure, measure_parameter};
+use jacoflow::flow::derived::{Measured, RegionMotion, RegionStatus, fit_region};
 use jacoflow::math::Real;
 use jacoflow::types::{FlowField, Region};
 use pyo3::IntoPyObjectExt;
@@ -54,14 +54,6 @@ pub fn restore_measurement(name: String, unit: String, is_stack: bool, rows: Vec
     Ok(Measurement { name, unit, is_stack, rows })
 }
 
-/// What is measured.
-pub enum Measured {
-    /// A parameter of the motion, by its place among (u, v, u_x, v_x, u_y, v_y).
-    Parameter(usize),
-    /// A derived quantity.
-    Derived(Quantity),
-}
-
 impl Measurement {
     /// For a quantity called `name`; without a row yet.
     pub fn new(name: &str, unit: String, is_stack: bool) -> Self {
@@ -72,15 +64,12 @@ impl Measurement {
     pub fn add<T: Real>(
         &mut self,
         field: &FlowField<T>,
-        measured: &Measured,
+        measured: Measured,
         region: Option<&Region>,
         at: Option<(f64, f64)>,
     ) -> jacoflow::Result<()> {
         let fit = fit_region(field, region, at)?;
-        let (value, std) = match measured {
-            Measured::Parameter(place) => measure_parameter(*place, &fit),
-            Measured::Derived(quantity) => measure(field, *quantity, &fit)?,
-        };
+        let (value, std) = measured.of_region(field, &fit)?;
         self.rows.push(Row { value, std, fit });
         Ok(())
     }

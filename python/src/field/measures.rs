@@ -147,7 +147,7 @@ impl FlowField {
         each!(self.store, packed => {
             for index in 0..self.count {
                 let field = self.core(packed, index);
-                py.detach(|| measurement.add(&field, &measured, region.as_ref(), at))?;
+                py.detach(|| measurement.add(&field, measured, region.as_ref(), at))?;
                 py.check_signals()?;
             }
         });

@@ -17,6 +17,8 @@ pub struct Packed<T: Real> {
     pub height: usize,
     /// Number of fields.
     pub count: usize,
+    /// Seconds between the frames of each field; not of one length where frames came unevenly.
+    pub periods: Vec<Option<f64>>,
     /// `count * P` planes.
     pub motion: Vec<T>,
     /// `count * P (P + 1) / 2` planes.
@@ -40,6 +42,7 @@ impl<T: Real> Packed<T> {
             width: field.width,
             height: field.height,
             count: 1,
+            periods: vec![field.layout.units.frame_period],
             motion: field.motion,
             covariance: field.covariance,
             // In place: the codes are as large as the status.
@@ -57,6 +60,7 @@ impl<T: Real> Packed<T> {
         if (field.width, field.height) != (self.width, self.height) || field.motion.len() != self.stride() {
             return Err(Error::argument("frames", "fields of one size and model", "fields that differ"));
         }
+        self.periods.push(field.layout.units.frame_period);
         extend_from(&mut self.motion, field.motion);
         self.status.extend(field.status.iter().map(|&s| s as u8));
         extend(&mut self.covariance, field.covariance);
@@ -87,6 +91,7 @@ impl<T: Real> Packed<T> {
         let sites = index * self.site_count()..(index + 1) * self.site_count();
         let mut layout = self.layout.clone();
         layout.frame_index += index;
+        layout.units.frame_period = self.periods[index];
         CoreField {
             layout,
             width: self.width,

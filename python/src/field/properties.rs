@@ -72,8 +72,8 @@ getters! {
     frame_index(this) -> usize = this.first_frame();
     /// Size (width, height) of the frames, px.
     frame_size(this) -> (usize, usize) = this.layout().frame_size;
-    /// Seconds between frames, or None.
-    frame_period(this) -> Option<f64> = this.layout().units.frame_period;
+    /// Seconds between frames, or None; of the first field of a stack.
+    frame_period(this) -> Option<f64> = each!(this.store, packed => packed.periods.get(this.start).copied().flatten());
     /// Physical size (dx, dy) of a pixel, 1 px or any length unit.
     pixel_pitch(this) -> (f64, f64) = this.layout().units.pixel_pitch;
     /// Name of the unit of lengths, "px" unless there is a pixel pitch.
@@ -134,10 +134,11 @@ impl FlowField {
     /// work on it: (u, v) of shape (H, W, 2), their Jacobian (H, W, 2, 2), [[u_x, u_y], [v_x, v_y]], and the
     /// covariance of (u, v), (H, W, 2, 2), or with a Jacobian of (u, v, u_x, v_x, u_y, v_y), (H, W, 6, 6).
     ///
-    /// NaN where the flow is unknown. Without a Jacobian derivatives are zero. `interval` is the time over
-    /// which the flow is taken: "forward" (default), from the field's frame to the next, "central", half the
-    /// displacement from the frame before to the one after, or "instant", the velocity. ValueError for other
-    /// shapes or names, negative variances and covariances with a negative eigenvalue.
+    /// NaN where the flow is unknown. Without a Jacobian derivatives read as zero, and quantities of them
+    /// (`divergence`, ...) are refused. `interval` is the time over which the flow is taken: "forward"
+    /// (default), from the field's frame to the next, "central", half the displacement from the frame before
+    /// to the one after, or "instant", the velocity. ValueError for other shapes or names, negative variances,
+    /// and covariances that are not symmetric or have a negative eigenvalue.
     #[staticmethod]
     #[pyo3(signature = (flow, covariance = None, jacobian = None, *, interval = None))]
     fn from_arrays(

@@ -16,6 +16,7 @@ pub fn save<'py>(field: &FlowField, py: Python<'py>) -> Outcome<Bound<'py, PyDic
     state.set_item("stack", field.stack)?;
     state.set_item("count", field.count)?;
     each!(field.store, packed => {
+        state.set_item("periods", &packed.periods[field.start..field.start + field.count])?;
         state.set_item("correlation_length", packed.layout.correlation_length)?;
         state.set_item("frame_index", packed.layout.frame_index + field.start)?;
         let part = |total: usize| {
@@ -44,7 +45,6 @@ fn layout_state<'py>(py: Python<'py>, layout: &FieldLayout) -> Outcome<Bound<'py
     state.set_item("frame_size", layout.frame_size)?;
     state.set_item("model", &layout.model)?;
     state.set_item("parameters", &layout.parameters)?;
-    state.set_item("frame_period", layout.units.frame_period)?;
     state.set_item("pixel_pitch", layout.units.pixel_pitch)?;
     state.set_item("length_unit", &layout.units.length)?;
     state.set_item("interval", layout.interval.name())?;
@@ -76,6 +76,11 @@ fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> Outcome<FlowField> {
         },
     };
     let interval = Interval::parse(&required(state, "interval")?.extract::<String>()?)?;
+    let count: usize = required(state, "count")?.extract()?;
+    let periods: Vec<Option<f64>> = required(state, "periods")?.extract()?;
+    if periods.len() != count {
+        return Err(Error::argument("state", format!("{count} periods"), periods.len()).into());
+    }
     let layout = FieldLayout {
         frame_size: required(state, "frame_size")?.extract()?,
         sites,
@@ -84,19 +89,19 @@ fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> Outcome<FlowField> {
         units: Units {
             pixel_pitch: required(state, "pixel_pitch")?.extract()?,
             length: required(state, "length_unit")?.extract()?,
-            frame_period: required(state, "frame_period")?.extract()?,
+            frame_period: periods.first().copied().flatten(),
         },
         interval,
         frame_index: required(state, "frame_index")?.extract()?,
         correlation_length: required(state, "correlation_length")?.extract()?,
     };
     let (width, height) = layout.sites.shape(layout.frame_size)?;
-    let count: usize = required(state, "count")?.extract()?;
     let (sites, parameters) = (width * height * count, layout.parameters.len());
     let packed = Packed {
         width,
         height,
         count,
+        periods,
         motion: plane::<T>(state, "motion", sites * parameters)?.ok_or_else(|| missing("motion"))?,
         covariance: plane(state, "covariance", sites * parameters * (parameters + 1) / 2)?,
         status: plane(state, "status", sites)?.ok_or_else(|| missing("status"))?,
@@ -134,18 +139,33 @@ pub fn from_arrays(
             let expected = format!("shape ({height}, {width}, {side}, {side})");
             return Err(Raised::from(Error::argument(name, expected, format!("shape {}", shape_text(&shape)))));
         }
-        Ok(planes(&values, side * side, places))
+        Ok((planes(&values, side * side, places), values))
     };
     let mut motion = planes(&values, 2, &[0, 1]);
     if let Some(jacobian) = jacobian {
-        motion.extend(matrices("jacobian", jacobian, 2, &[0, 2, 1, 3])?);
+        motion.extend(matrices("jacobian", jacobian, 2, &[0, 2, 1, 3])?.0);
     }
     let side = if jacobian.is_some() { 6 } else { 2 };
     let upper: Vec<usize> = (0..side).flat_map(|i| (i..side).map(move |j| i * side + j)).collect();
     let covariance = covariance.map(|object| matrices("covariance", object, side, &upper)).transpose()?;
+    let is_asymmetric = |matrix| is_asymmetric(matrix, side);
+    if let Some((_, values)) = &covariance
+        && let Some(site) = values.chunks_exact(side * side).position(is_asymmetric)
+    {
+        let got = format!("an asymmetric one at pixel ({}, {})", site % width, site / width);
+        return Err(Error::argument("covariance", "symmetric matrices", got).into());
+    }
+    let covariance = covariance.map(|(upper, _)| upper);
     let mut field = jacoflow::types::FlowField::from_planes((width, height), motion, covariance)?;
     field.layout.interval = interval.map(Interval::parse).transpose()?.unwrap_or_default();
     Ok(FlowField::single(field))
+}
+
+/// Whether elements of a matrix differ from their mirror images by more than rounding in single precision.
+fn is_asymmetric(matrix: &[f64], side: usize) -> bool {
+    let at = |i: usize, j: usize| matrix[i * side + j];
+    let pairs = || (0..side).flat_map(|i| (0..i).map(move |j| (i, j)));
+    pairs().any(|(i, j)| (at(i, j) - at(j, i)).abs() > f64::from(f32::EPSILON) * (at(i, i) * at(j, j)).sqrt())
 }
 
 fn missing(name: &str) -> Raised {

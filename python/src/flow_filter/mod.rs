@@ -2,8 +2,9 @@
 
 mod arguments;
 
-use super::arrays::{self, ColourRule, Frames};
+use super::arrays::{self, ColourRule};
 use super::estimate::Growing;
+use super::frame_list::Frames;
 use super::options::{self, Integer, Object, PreprocessOptions};
 use super::{field::FlowField, keywords::constructor, keywords::with_common, samples::is_masked};
 use crate::errors::Outcome;

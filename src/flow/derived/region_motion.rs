@@ -1,13 +1,10 @@
 //! One affine motion for a whole region, from the estimates of its sites.
 
+use super::Motion;
 use super::common_residual::common_residual;
+use super::dominant::{Site, dominant_motion};
 use super::region::{carry_to, sites_in, valid_sites};
 use super::sharing::{in_common, sharing_among};
-use super::{
-    Motion, Quantity,
-    dominant::{Site, dominant_motion},
-    region, unbiased_value_and_std,
-};
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FlowField, MOTION_NAMES, Region, choices};
@@ -59,30 +56,6 @@ impl RegionMotion {
     pub fn valid_share(&self) -> f64 {
         self.valid as f64 / self.sites.max(1) as f64
     }
-}
-
-/// Value of a quantity for the motion of a region, with its standard deviation; see [`fit_region`].
-///
-/// # Errors
-/// [`Error::Argument`] naming `quantity` for one that the field cannot give, and as [`fit_region`].
-pub fn measure<T: Real>(field: &FlowField<T>, quantity: Quantity, fit: &RegionMotion) -> Result<(f64, f64)> {
-    region::check(field, quantity)?;
-    let (dx, dy) = field.layout.units.pixel_pitch;
-    let motion = Motion {
-        parameters: fit.motion,
-        covariance: Some(fit.covariance),
-        at: (fit.centre.0 * dx, fit.centre.1 * dy),
-        interval: field.layout.interval,
-        units: &field.layout.units,
-    };
-    let (value, std) = unbiased_value_and_std(quantity, &motion);
-    Ok((value, std.unwrap_or(f64::NAN)))
-}
-
-/// The parameter at `place` among `(u, v, u_x, v_x, u_y, v_y)` for the motion of a region at its centre, with
-/// its standard deviation.
-pub fn measure_parameter(place: usize, fit: &RegionMotion) -> (f64, f64) {
-    (fit.motion[place], fit.covariance[place][place].sqrt())
 }
 
 /// Fits one affine motion `m0` about the centre (or `at`) to the estimates `m_i` (covariance `C_i`) of the

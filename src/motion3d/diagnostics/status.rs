@@ -7,6 +7,7 @@ use crate::motion3d::kernels::{Bilinear, Weighted, best_rotation, depths, equati
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::result::{Alternative, Status};
+use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::model::whitening::Whitening;
 use crate::motion3d::solver::covariance::{PLAUSIBLE, determined, direction_deviation};
 use crate::motion3d::solver::depth_smoother;
@@ -14,7 +15,7 @@ use crate::motion3d::solver::likelihood::{DISTINCT, SAME};
 use crate::motion3d::solver::refine::{MANY, StoppingCriteria, descend};
 use crate::motion3d::solver::starts::{SEARCHED, at_most, evaluate};
 use crate::scattered::{SiteSmoother, Smoother};
-use nalgebra::{Matrix2x3, Vector3};
+use nalgebra::{Matrix2x3, Vector2, Vector3};
 
 /// Below so many points several motions may explain them exactly.
 const FEW: usize = 12;
@@ -79,6 +80,30 @@ pub(crate) fn judge(
     } else {
         Status::Ok
     };
+    if solution.status == Status::IllConditioned
+        && let Some(covariance) = &mut solution.covariance
+    {
+        *covariance += between(&solution.motion, &solution.tangent, &solution.alternatives);
+    }
+}
+
+/// What the alternatives add to a covariance by the law of total variance, with the probabilities that their
+/// likelihoods give them.
+fn between(motion: &Motion, tangent: &Matrix2x3<f64>, alternatives: &[Alternative]) -> Matrix5 {
+    let weights: Vec<f64> = alternatives.iter().map(|other| (-0.5 * other.excess.max(0.0)).exp()).collect();
+    let all = 1.0 + weights.iter().sum::<f64>();
+    let apart = |other: &Motion| {
+        let across = tangent * other.u();
+        // The opposite direction lies along any axis.
+        let axis = across.try_normalize(f64::EPSILON).unwrap_or(Vector2::x()) * motion.angle_to(other);
+        let turn = other.w() - motion.w();
+        Vector5::new(axis.x, axis.y, turn.x, turn.y, turn.z)
+    };
+    let added = alternatives.iter().zip(weights).map(|(other, weight)| {
+        let apart = apart(&other.motion);
+        apart * apart.transpose() * (weight / all)
+    });
+    added.sum()
 }
 
 /// The alternatives without those within `same` degrees of an earlier one.

@@ -1,8 +1,8 @@
-//! Derived quantities of a region or of points, one row each and frame.
+//! Motion and derived quantities of a region or of points, one row each and frame.
 
 use super::{Sink, Step, ends_as, table::Table, table::TableTarget};
 use crate::error::{Error, Result};
-use crate::flow::derived::{Motion, Quantity, RegionStatus, fit_region, measure, value_and_std};
+use crate::flow::derived::{Measured, Motion, RegionStatus, fit_region};
 use crate::io::cell;
 use crate::math::Real;
 use crate::types::{Region, SamplingGrid};
@@ -30,7 +30,7 @@ pub struct MeasuredRegion {
 #[derive(Debug)]
 pub struct Measurements {
     table: Table,
-    quantities: Vec<Quantity>,
+    quantities: Vec<Measured>,
     place: MeasuredRegion,
 }
 
@@ -44,7 +44,7 @@ struct Place {
 
 impl Measurements {
     /// Opens the table.
-    pub fn open(target: &TableTarget, quantities: Vec<Quantity>, place: MeasuredRegion) -> Result<Self> {
+    pub fn open(target: &TableTarget, quantities: Vec<Measured>, place: MeasuredRegion) -> Result<Self> {
         Ok(Self { table: Table::create(target, &HEADER)?, quantities, place })
     }
 
@@ -53,7 +53,7 @@ impl Measurements {
         &mut self,
         step: &Step<'_, T>,
         place: &Place,
-        of: impl Fn(Quantity) -> Result<(f64, f64)>,
+        of: impl Fn(Measured) -> Result<(f64, f64)>,
     ) -> Result<()> {
         let layout = &step.field.layout;
         let time = step.time.map(cell).unwrap_or_default();
@@ -90,16 +90,13 @@ impl<T: Real> Sink<Step<'_, T>> for Measurements {
                 let share = f64::from(u8::from(field.status[site].is_valid()));
                 let at = (x as f64, y as f64);
                 let place = Place { at, share, valid_share: share, status: field.status[site].name() };
-                self.rows(step, &place, |quantity| {
-                    let (value, std) = value_and_std(quantity, &motion);
-                    Ok((value, std.unwrap_or(f64::NAN)))
-                })?;
+                self.rows(step, &place, |quantity| Ok(quantity.of_motion(&motion)))?;
             }
         } else {
             let fit = fit_region(field, self.place.region.as_ref(), self.place.at)?;
             let (share, valid_share) = (fit.share(), fit.valid_share());
             let place = Place { at: fit.centre, share, valid_share, status: RegionStatus::name(fit.status) };
-            self.rows(step, &place, |quantity| measure(field, quantity, &fit))?;
+            self.rows(step, &place, |quantity| quantity.of_region(field, &fit))?;
         }
         self.table.flush()
     }

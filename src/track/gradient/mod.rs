@@ -87,8 +87,8 @@ impl GradientTracker {
     /// until then its status is lost and its box empty.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `frame` (smaller than 16 px a side, not finite), `bbox` (a side under 3 px,
-    /// wholly outside, not finite) or `center` (outside).
+    /// [`Error::Argument`] naming `frame` (smaller than 16 px a side, mostly not finite), `bbox` (a side under
+    /// 3 px, wholly outside, not finite) or `center` (outside).
     pub fn new(frame: &Frame<f64>, start: Start, options: &GradientOptions) -> Result<Self> {
         Self::begin(frame, start, Method::Layered(options.clone()))
     }
@@ -104,7 +104,7 @@ impl GradientTracker {
     }
 
     fn begin(frame: &Frame<f64>, start: Start, method: Method) -> Result<Self> {
-        start::check_frame(frame)?;
+        let frame = &*start::first_frame(frame)?;
         let waiting = |near| Engine::Waiting(Waiting::new(frame, near));
         let (state, engine) = match start {
             Start::Box(bounds) => method.begin(frame, start::checked_box(bounds, frame.size())?),
@@ -131,11 +131,12 @@ impl Tracker for GradientTracker {
             let expected = format!("as large as the first, {}", size(self.size));
             return Err(Error::argument("frame", expected, size(frame.size())));
         }
-        let usable = start::is_usable(frame).then_some(frame);
         self.state.frame += 1;
         match &mut self.engine {
             Engine::Waiting(waiting) => {
-                let found = usable.and_then(|frame| Some((frame, waiting.find(frame, self.method.camera())?)));
+                let usable = start::completed(frame);
+                let found =
+                    usable.as_deref().and_then(|frame| Some((frame, waiting.find(frame, self.method.camera())?)));
                 if let Some((frame, bounds)) = found {
                     let (state, engine) = self.method.begin(frame, bounds);
                     self.state =
@@ -143,9 +144,9 @@ impl Tracker for GradientTracker {
                     self.engine = engine;
                 }
             }
-            Engine::Layered(state) => layered::update(state, usable, &mut self.state),
+            Engine::Layered(state) => layered::update(state, start::seen(frame), &mut self.state),
             #[cfg(feature = "reference")]
-            Engine::Local(engine) => engine.update(usable, &mut self.state),
+            Engine::Local(engine) => engine.update(start::completed(frame).as_deref(), &mut self.state),
         }
         Ok(self.state.clone())
     }

@@ -3,9 +3,10 @@
 
 use super::{detect::camera_moved, detect::detect_moving_target, layered, options::CameraMotion};
 use crate::error::{Error, Result};
-use crate::image::all_finite;
+use crate::image::fill_holes;
 use crate::track::grey_levels::GREATEST;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
+use std::borrow::Cow;
 
 /// Smallest side of a frame, px.
 const MIN_FRAME_SIDE: usize = 16;
@@ -61,26 +62,39 @@ pub(super) fn checked_point(at: [f64; 2], (width, height): (usize, usize)) -> Re
     Err(Error::argument("center", expected, format!("({}, {})", at[0], at[1])))
 }
 
-pub(super) fn check_frame(frame: &Frame<f64>) -> Result<()> {
+/// The first frame, without missing samples.
+pub(super) fn first_frame(frame: &Frame<f64>) -> Result<Cow<'_, Frame<f64>>> {
     let (width, height) = frame.size();
     if width < MIN_FRAME_SIDE || height < MIN_FRAME_SIDE {
         let expected = format!("a frame of at least {MIN_FRAME_SIDE} x {MIN_FRAME_SIDE} px");
         return Err(Error::argument("frame", expected, format!("{width} x {height}")));
     }
-    if !all_finite(frame) {
-        return Err(Error::argument("frame", "finite samples in the first frame", "NaN or infinity"));
-    }
-    if let Some(sample) = frame.data().iter().find(|sample| sample.abs() > GREATEST) {
-        let expected = format!("samples of at most {GREATEST:e} grey levels in the first frame");
-        return Err(Error::argument("frame", expected, format!("{sample:e}")));
-    }
-    Ok(())
+    completed(frame).ok_or_else(|| {
+        let expected = format!("finite samples of at most {GREATEST:e} grey levels in half of the first frame");
+        Error::argument("frame", expected, "fewer")
+    })
 }
 
-/// Whether all samples of a frame are brightness.
-pub(super) fn is_usable(frame: &Frame<f64>) -> bool {
-    let greatest = frame.data().iter().fold(0.0, |greatest: f64, sample| greatest.max(sample.abs()));
-    greatest <= GREATEST && all_finite(frame)
+/// The frame with missing samples (masked, NaN, infinite, no brightness) filled by a continuation of those
+/// around them; `None` where more than half are missing.
+pub(super) fn completed(frame: &Frame<f64>) -> Option<Cow<'_, Frame<f64>>> {
+    let known = seen(frame)?;
+    Some(match known {
+        Cow::Borrowed(frame) => Cow::Borrowed(frame),
+        Cow::Owned(frame) => Cow::Owned(fill_holes(&frame, None).into_owned()),
+    })
+}
+
+/// The frame with NaN for missing samples; `None` where more than half are missing.
+pub(super) fn seen(frame: &Frame<f64>) -> Option<Cow<'_, Frame<f64>>> {
+    // Also false for NaN.
+    let is_brightness = |sample: &f64| sample.abs() <= GREATEST;
+    let missing = frame.data().iter().filter(|sample| !is_brightness(sample)).count();
+    match missing {
+        0 => Some(Cow::Borrowed(frame)),
+        _ if 2 * missing > frame.data().len() => None,
+        _ => Some(Cow::Owned(frame.map(|sample| if is_brightness(sample) { *sample } else { f64::NAN }))),
+    }
 }
 
 pub(super) fn checked_box(bounds: TargetBox, (width, height): (usize, usize)) -> Result<TargetBox> {

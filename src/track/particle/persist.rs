@@ -88,7 +88,6 @@ impl ParticleTracker {
         Ok(Self {
             options,
             size,
-            dtype: last.dtype(),
             gain: saved.gain,
             scale,
             frame: saved.frame as usize,

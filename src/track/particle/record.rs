@@ -5,6 +5,7 @@ use super::foreground::ForegroundMap;
 use super::options::ParticleOptions;
 use super::step::{CornerTrack, ParticleStep};
 use super::tracker::ParticleTracker;
+use super::view::in_levels;
 use crate::error::{Error, Result};
 use crate::segment::{Labels, felzenszwalb};
 use crate::types::{AnyColourFrame, ColourFrame, Frame};
@@ -18,7 +19,7 @@ pub type Particles = (Vec<[f64; 6]>, Vec<f64>);
 pub struct StepRecord {
     pub(super) step: ParticleStep,
     pub(super) options: ParticleOptions,
-    /// What samples are multiplied by to be grey levels.
+    /// What samples of floats are multiplied by to be grey levels.
     pub(super) gain: f64,
     /// Factor of all lengths.
     pub(super) scale: f64,
@@ -108,6 +109,6 @@ impl StepRecord {
     /// The frame in grey levels.
     fn colour(&self) -> Result<ColourFrame<f32>> {
         let missing = || Error::argument("frame", "a step that keeps its frame", "one that does not");
-        Ok(self.frame.as_ref().ok_or_else(missing)?.scaled(self.gain))
+        Ok(in_levels(self.frame.as_ref().ok_or_else(missing)?, self.gain))
     }
 }

@@ -12,7 +12,7 @@ use super::prediction::{FrameContext, Prediction, predict_targets};
 use super::report::{StepCause, Tracked, report};
 use super::step::ParticleStep;
 use super::target::{Target, labelled};
-use super::view::{View, level_gain};
+use super::view::{View, float_gain};
 use crate::error::{Error, Result};
 use crate::flow::points::PointPyramid;
 use crate::math::random::CounterRng;
@@ -40,7 +40,6 @@ const CAMERA_STREAM: u64 = u64::MAX;
 pub struct ParticleTracker {
     pub(super) options: ParticleOptions,
     pub(super) size: (usize, usize),
-    pub(super) dtype: &'static str,
     /// What samples are multiplied by to be grey levels.
     pub(super) gain: f64,
     /// Factor of all lengths.
@@ -73,7 +72,7 @@ impl ParticleTracker {
             let expected = format!("a picture of at least {MIN_SIDE} x {MIN_SIDE} px");
             return Err(Error::argument("frame", expected, format!("{} x {} px", size.0, size.1)));
         }
-        let gain = level_gain(frame);
+        let gain = float_gain(frame);
         let scale = options.length_scale(size.1);
         let (view, pyramid, corners) = options.threads.install(|| {
             let view = View::new(frame, gain, options.uses("particle.values"));
@@ -92,7 +91,6 @@ impl ParticleTracker {
         let mut tracker = Self {
             options: options.clone(),
             size,
-            dtype: frame.dtype(),
             gain,
             scale,
             frame: 0,
@@ -184,10 +182,10 @@ impl ParticleTracker {
         frame: &AnyColourFrame,
         camera: Option<[[f64; 3]; 2]>,
     ) -> Result<&ParticleStep> {
-        if (frame.size(), frame.dtype()) != (self.size, self.dtype) {
-            let words = |size: (usize, usize), dtype| format!("{} x {} px of {dtype}", size.0, size.1);
-            let expected = format!("a frame like the first one, {}", words(self.size, self.dtype));
-            return Err(Error::argument("frame", expected, words(frame.size(), frame.dtype())));
+        if frame.size() != self.size {
+            let words = |size: (usize, usize)| format!("{} x {} px", size.0, size.1);
+            let expected = format!("a frame as large as the first one, {}", words(self.size));
+            return Err(Error::argument("frame", expected, words(frame.size())));
         }
         if let Some(camera) = camera.filter(|camera| !is_camera(camera)) {
             let got = crate::error::numbers(camera.as_flattened());

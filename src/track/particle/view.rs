@@ -16,9 +16,10 @@ pub(super) struct View {
 }
 
 impl View {
-    /// Converts a frame. `values`: pixels without hue have bins of value.
-    pub fn new(frame: &AnyColourFrame, gain: f64, values: bool) -> Self {
-        let colour = frame.scaled(gain);
+    /// Converts a frame; `float_gain` is what samples of floats are multiplied by. `values`: pixels without
+    /// hue have bins of value.
+    pub fn new(frame: &AnyColourFrame, float_gain: f64, values: bool) -> Self {
+        let colour = in_levels(frame, float_gain);
         let bins = colour_bins(&colour, values);
         let (width, height) = colour.size();
         let mut grey = Frame::filled(width, height, 0.0);
@@ -36,21 +37,24 @@ impl View {
     }
 }
 
-/// What the samples of a sequence are multiplied by to be grey levels, decided by its first frame.
-pub(super) fn level_gain(frame: &AnyColourFrame) -> f64 {
+/// What the floats of a sequence are multiplied by to be grey levels, decided by its first frame.
+pub(super) fn float_gain(first: &AnyColourFrame) -> f64 {
     fn brightest<S: Sample>(frame: &ColourFrame<S>) -> AnyFrame {
         AnyFrame::F64(frame.map(|pixel| pixel.map(S::to_real::<f64>).into_iter().fold(f64::NAN, f64::max)))
     }
-    match frame {
+    match first {
+        AnyColourFrame::U8(_) | AnyColourFrame::U16(_) => GreyLevels::of_integers(),
+        AnyColourFrame::F32(frame) => GreyLevels::decide(&brightest(frame)),
+        AnyColourFrame::F64(frame) => GreyLevels::decide(&brightest(frame)),
+    }
+    .float_gain()
+}
+
+/// A frame in grey levels.
+pub(super) fn in_levels(frame: &AnyColourFrame, float_gain: f64) -> ColourFrame<f32> {
+    frame.scaled(match frame {
         AnyColourFrame::U8(_) => 1.0,
         AnyColourFrame::U16(_) => 255.0 / u16::FULL_SCALE,
-        AnyColourFrame::F32(frame) => {
-            let first = brightest(frame);
-            GreyLevels::decide(&first).gain(&first)
-        }
-        AnyColourFrame::F64(frame) => {
-            let first = brightest(frame);
-            GreyLevels::decide(&first).gain(&first)
-        }
-    }
+        AnyColourFrame::F32(_) | AnyColourFrame::F64(_) => float_gain,
+    })
 }

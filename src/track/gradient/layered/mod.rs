@@ -48,6 +48,7 @@ mod task;
 pub(super) use state::State;
 
 use super::shift::shifted;
+use crate::image::fill_holes;
 use crate::types::{Frame, TargetBox, TrackState, TrackStatus};
 use apply::{apply_measurement, coast};
 use camera::FramePyramid;
@@ -58,6 +59,7 @@ use report::{hold_at_border, report};
 use restart::{resolve_initial, update_displacement_uncertainty};
 use scene::{follow_camera, is_blank, is_wild, measure_camera_motion, normalize_light};
 use state::MIN_NOISE;
+use std::borrow::Cow;
 
 /// What is said of a frame with NaN, infinity or numbers that are no brightness.
 const UNUSABLE: &str = "the frame cannot be used";
@@ -72,11 +74,12 @@ pub(super) fn stilled(frame: &Frame<f64>, next: &Frame<f64>) -> Option<Frame<f64
     (motion != [0.0; 2]).then(|| shifted(frame, motion.map(|m| -m)))
 }
 
-/// The next frame; `None`: it cannot be used.
-pub(super) fn update(tracker: &mut State, frame: Option<&Frame<f64>>, state: &mut TrackState) {
+/// The next frame, NaN where samples are missing; `None`: it cannot be used.
+pub(super) fn update(tracker: &mut State, frame: Option<Cow<'_, Frame<f64>>>, state: &mut TrackState) {
     let was_lost = matches!(state.status, TrackStatus::Lost | TrackStatus::Out);
     tracker.scene.gap += 1;
     let Some(frame) = frame else { return pass_over(tracker, state, UNUSABLE) };
+    let frame = &with_background(frame, &tracker.background.picture);
     if crate::ablation::keeps("gradient.blank_frame") && is_blank(tracker, frame) {
         return pass_over(tracker, state, BLANK);
     }
@@ -111,6 +114,18 @@ pub(super) fn update(tracker: &mut State, frame: Option<&Frame<f64>>, state: &mu
     state.reacquired = was_lost && finding.is_some();
     hold_at_border(tracker, state, frame.size());
     tracker.scene.buffer = std::mem::replace(&mut tracker.scene.previous, seen).frame.into_data();
+}
+
+/// What is missing shows what is behind the target: there it is hidden.
+fn with_background<'a>(frame: Cow<'a, Frame<f64>>, background: &Frame<f64>) -> Cow<'a, Frame<f64>> {
+    let Cow::Owned(mut frame) = frame else { return frame };
+    for (value, behind) in frame.data_mut().iter_mut().zip(background.data()) {
+        *value = if value.is_nan() { *behind } else { *value };
+    }
+    match fill_holes(&frame, None) {
+        Cow::Owned(filled) => Cow::Owned(filled),
+        Cow::Borrowed(_) => Cow::Owned(frame),
+    }
 }
 
 fn pass_over(tracker: &mut State, state: &mut TrackState, reason: &'static str) {
