@@ -1,7 +1,7 @@
 """Coarse-to-fine estimate between frames that are not equally bright, beside saturated pixels, over large motions, beside
 a motion boundary (of three frames too) and of undersampled texture: errors, px; share of errors above 1 px that neither
-status nor standard deviation states; change by saturated pixels, standard deviations; share of errors outside 95 %
-intervals; time on equal frames."""
+status nor standard deviation states; change by saturated pixels, standard deviations; bias of pairs in noise, px; share
+of errors outside 95 % intervals; time on equal frames."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 
 import jacoflow
 from benchmarks.scenes import disturbed as scenes
+from benchmarks.scenes import steps
 
 SEEDS = (41, 42, 43)
 """Of textures that no rule was chosen on."""
@@ -19,12 +20,15 @@ SPECKED = range(41, 53)
 """Seeds with saturated pixels: these bias the whole field in about half of the trials only."""
 FRACTIONS = ((0.25, 0.3), (1.7, -0.35), (-0.6, 1.4))
 """Motions of undersampled texture, px."""
+NOISY = (0.5, 1.5, 2.5)
+"""Motions of noisy texture, px, and its noise, grey levels."""
+NOISE = 4.0
 SHIFTS = ((56, 0), (0, -64), (80, 60))
 
 
 def rows() -> dict[str, list[float]]:
     """One value for each change and seed, each seed, each shift and seed."""
-    found: dict[str, list[float]] = {"equal": [], "changed": [], "specks": [], "shifts": [], "boundary": [], "three frames": [], "silent": [], "undersampled": [], "outside": [], "ms": []}
+    found: dict[str, list[float]] = {"equal": [], "changed": [], "specks": [], "shifts": [], "boundary": [], "three frames": [], "silent": [], "undersampled": [], "noise": [], "outside": [], "ms": []}
     for seed in SEEDS:
         begun = time.process_time()
         found["equal"].append(error(scenes.changed_pair(seed, (3.3, -1.4)), (3.3, -1.4)))
@@ -52,6 +56,11 @@ def rows() -> dict[str, list[float]]:
         std = scenes.inner(np.stack([field.std("u"), field.std("v")], axis=-1))
         found["undersampled"].append(float(np.sqrt(np.mean(off**2))))
         found["outside"].append(float(np.mean(off > 1.96 * std)))
+    for shift, seed in itertools.product(NOISY, SEEDS):
+        rng, picture = np.random.default_rng(seed), steps.texture(seed)
+        pair = (steps.moved(picture, np.eye(2), (k * shift, 0.0)) for k in (0, 1))
+        field = jacoflow.flow(*(frame + rng.normal(0, NOISE, frame.shape) for frame in pair), covariance=False, threads=1)
+        found["noise"].append(abs(float(np.mean(scenes.inner(field.u))) - shift))
     for shift, seed in itertools.product(SHIFTS, SEEDS):
         field = jacoflow.flow(*scenes.shifted_speckle(seed, shift), covariance=False, threads=1)
         distance = np.linalg.norm(field.flow - np.array(shift), axis=-1)

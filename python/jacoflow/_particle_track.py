@@ -163,8 +163,8 @@ class ParticleTracker:
     Parameters
     ----------
     frame : array (H, W, 3) of uint8, uint16, float32 or float64, red, green, blue
-        The first frame, at least 8 x 8 px. White is 255 or 65535; of floats the first frame decides whether
-        it is 1 or 255. Pixels that are masked (numpy.ma) or not finite are not counted.
+        The first frame, at least 8 x 8 px. White is 255 or 65535; of floats it is 1, or 255 from the
+        first frame on that holds such levels. Pixels that are masked (numpy.ma) or not finite are not counted.
     boxes : array (K, 4) or dict id -> box
         Left, top, width, height, px, of the targets in it; rows have the ids 0 to K - 1. May be empty. A box
         may reach over the border. The colours of a box are compared in 8 bands from top to bottom; one of
@@ -242,7 +242,7 @@ class ParticleTracker:
         self._options = {**given, "segmentation": dict(zip(names, given["segmentation"], strict=True))}
 
     def update(self, frame: ArrayLike, camera: ArrayLike | None = None) -> ParticleStep:
-        """The targets in the next frame, an array (H, W, 3) as large and of the same dtype as the first.
+        """The targets in the next frame, an array (H, W, 3) as large as the first.
 
         A frame without finite pixels is one in which nothing was seen: targets move on, nothing is learnt.
         `camera`: the background's motion since the frame before where it is known, (2, 3): (x', y') = camera
@@ -251,7 +251,7 @@ class ParticleTracker:
         Raises
         ------
         ValueError
-            For a frame of another size or dtype, naming both, and a `camera` that is not finite.
+            For a frame of another size, naming both, and a `camera` that is not finite.
         """
         return step_of(self._tracker.update(as_frame(frame), checked_camera(camera)))
 

@@ -112,3 +112,14 @@ def test_the_stereo_tracker_takes_masked_views():
         np.testing.assert_array_equal(step.cols, same.cols)
         np.testing.assert_allclose(step.values, same.values)
     assert len(step.cols) and step.rows.min() >= 8
+
+
+@pytest.mark.parametrize("gain", [1, 1 / 255])
+def test_the_type_of_particle_frames_may_change(gain):
+    frames, centres = scene(6)
+    plain = np.round(np.repeat(frames[..., None], 3, axis=-1)).astype(np.uint8)
+    boxes = [(*(centres[0] - 9.5), 19, 19)]
+    same, other = ParticleTracker(plain[0], boxes), ParticleTracker(plain[0], boxes)
+    for frame in plain[1:]:
+        step, changed = same.update(frame), other.update(frame.astype(np.float64) * gain)
+        np.testing.assert_allclose(changed.boxes, step.boxes, atol=1e-3)

@@ -74,13 +74,11 @@ def test_options_of_another_type_are_named(name, value):
 @pytest.mark.parametrize(
     ("frame", "error", "message"),
     [
-        (np.zeros((30, 41, 3), np.uint8), ValueError, r"frame: expected a frame like the first one, 40 x 30 px of uint8, got 41 x 30 px of uint8"),
-        (np.zeros((30, 40, 3), np.float32), ValueError, r"frame: expected .*40 x 30 px of uint8, got 40 x 30 px of float32"),
+        (np.zeros((30, 41, 3), np.uint8), ValueError, r"frame: expected a frame as large as the first one, 40 x 30 px, got 41 x 30 px"),
         (np.zeros((30, 40, 4), np.uint8), ValueError, r"frame: expected a colour frame \(H, W, 3\), got shape \(30, 40, 4\)"),
         (np.zeros((2, 30, 40, 3), np.uint8), ValueError, r"frame: expected a colour frame \(H, W, 3\), got shape"),
         (np.zeros((30, 40), np.uint8), ValueError, r"frame: expected a colour frame .*colour is needed"),
         (np.zeros((30, 40, 3), complex), TypeError, r"frame: expected an array of bool, integers of 8 to 64 bits, float16, float32 or float64, got complex128"),
-        (np.ma.masked_array(FRAME), TypeError, r"frame: expected a plain array, got a masked one"),
         (None, TypeError, r"frame: expected|frame: "),
     ],
 )

@@ -89,8 +89,11 @@ def test_others_take_other_types_too(take):
     take(frame)
     with pytest.raises(ValueError, match=r"2\^53"):
         take(frame + 2**60)
+
+
+def test_segments_are_those_of_plain_frames():
     with pytest.raises(TypeError, match="masked"):
-        take(np.ma.array(frame))
+        jacoflow.segment.felzenszwalb(np.ma.array(np.zeros((64, 64))))
 
 
 @pytest.mark.parametrize("frame", [3, np.int64(3), np.array(3.0)])

@@ -50,8 +50,13 @@ pub fn sizes(dim_x: Integer, dim_z: Integer, batch: Option<Integer>) -> Outcome<
 }
 
 impl GaussianFilter {
-    /// The arrays of a new core state.
-    pub fn new(py: Python<'_>, state: &GaussianState, batch: Option<usize>) -> Outcome<Self> {
+    /// The arrays of a new core state, and the first of [`FUNCTIONS`].
+    pub fn new<const N: usize>(
+        py: Python<'_>,
+        state: &GaussianState,
+        batch: Option<usize>,
+        functions: [Option<Py<PyAny>>; N],
+    ) -> Outcome<Self> {
         let variables = Variables {
             arrays: std::array::from_fn(|_| py.None()),
             functions: std::array::from_fn(|_| py.None()),
@@ -62,6 +67,7 @@ impl GaussianFilter {
         filter.set(2, arrays::owned(py, &[state.dim_x; 2], state.Q.clone())?.unbind());
         filter.set(3, arrays::owned(py, &[state.dim_z; 2], state.R.clone())?.unbind());
         filter.take(py, state)?;
+        filter.set_functions(py, functions)?;
         Ok(filter)
     }
 
@@ -97,6 +103,10 @@ impl GaussianFilter {
         let old = std::mem::replace(&mut self.variables().functions[index], function);
         drop(old);
         Ok(())
+    }
+
+    fn set_functions(&self, py: Python<'_>, functions: impl IntoIterator<Item = Option<Py<PyAny>>>) -> Outcome<()> {
+        functions.into_iter().enumerate().try_for_each(|(index, function)| self.set_function(py, index, function))
     }
 
     pub fn function(&self, py: Python<'_>, index: usize) -> Py<PyAny> {
@@ -236,9 +246,7 @@ impl GaussianFilter {
             self.set(index, self.covariance(index, &entry(state, name)?)?);
         }
         let functions: [Option<Py<PyAny>>; FUNCTIONS.len()] = entry(state, "functions")?.extract()?;
-        for (index, function) in functions.into_iter().enumerate() {
-            self.set_function(state.py(), index, function)?;
-        }
+        self.set_functions(state.py(), functions)?;
         let failed: Vec<bool> = entry(state, "failed")?.extract()?;
         let repairs = entry(state, "repairs")?.extract()?;
         let mut variables = self.variables();

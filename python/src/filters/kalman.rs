@@ -57,10 +57,7 @@ impl KalmanFilter {
     ) -> Outcome<PyClassInitializer<Self>> {
         let (dim_x, dim_z, batch) = sizes(dim_x, dim_z, batch)?;
         let core = Core::new(batch.unwrap_or(1), dim_x, dim_z)?;
-        let base = GaussianFilter::new(py, &core.state, batch)?;
-        for (index, function) in [residual_x, residual_z, state_add].into_iter().enumerate() {
-            base.set_function(py, index, function)?;
-        }
+        let base = GaussianFilter::new(py, &core.state, batch, [residual_x, residual_z, state_add])?;
         let f = arrays::owned(py, &[dim_x, dim_x], core.F.clone())?.unbind();
         let h = arrays::owned(py, &[dim_z, dim_x], core.H.clone())?.unbind();
         Ok(PyClassInitializer::from(base).add_subclass(Self {

@@ -95,10 +95,8 @@ impl UnscentedKalmanFilter {
             return Err(Error::argument("points", expected, format!("{} dimensions", points.n)).into());
         }
         core.redraw = redraw;
-        let base = GaussianFilter::new(py, &core.state, batch)?;
-        for (index, function) in [residual_x, residual_z, state_add, x_mean, z_mean].into_iter().enumerate() {
-            base.set_function(py, index, function)?;
-        }
+        let functions = [residual_x, residual_z, state_add, x_mean, z_mean];
+        let base = GaussianFilter::new(py, &core.state, batch, functions)?;
         Ok(PyClassInitializer::from(base).add_subclass(Self {
             core: Mutex::new(core),
             fx: Mutex::new(fx),

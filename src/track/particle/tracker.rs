@@ -12,10 +12,11 @@ use super::prediction::{FrameContext, Prediction, predict_targets};
 use super::report::{StepCause, Tracked, report};
 use super::step::ParticleStep;
 use super::target::{Target, labelled};
-use super::view::{View, float_gain};
+use super::view::{View, revised};
 use crate::error::{Error, Result};
 use crate::flow::points::PointPyramid;
 use crate::math::random::CounterRng;
+use crate::track::GreyLevels;
 use crate::types::{AnyColourFrame, Frame, TargetBox};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -40,7 +41,7 @@ const CAMERA_STREAM: u64 = u64::MAX;
 pub struct ParticleTracker {
     pub(super) options: ParticleOptions,
     pub(super) size: (usize, usize),
-    /// What samples are multiplied by to be grey levels.
+    /// What samples of floats are multiplied by to be grey levels.
     pub(super) gain: f64,
     /// Factor of all lengths.
     pub(super) scale: f64,
@@ -72,7 +73,7 @@ impl ParticleTracker {
             let expected = format!("a picture of at least {MIN_SIDE} x {MIN_SIDE} px");
             return Err(Error::argument("frame", expected, format!("{} x {} px", size.0, size.1)));
         }
-        let gain = float_gain(frame);
+        let gain = revised(GreyLevels::of_integers(), frame).float_gain();
         let scale = options.length_scale(size.1);
         let (view, pyramid, corners) = options.threads.install(|| {
             let view = View::new(frame, gain, options.uses("particle.values"));
@@ -221,6 +222,7 @@ impl ParticleTracker {
     }
 
     fn advance(&mut self, frame: &AnyColourFrame, known: Option<CameraMotion>) -> Result<()> {
+        self.gain = revised(GreyLevels::of_floats(self.gain), frame).float_gain();
         let view = View::new(frame, self.gain, self.options.uses("particle.values"));
         if view.is_empty() {
             self.frame += 1;

@@ -37,17 +37,16 @@ impl View {
     }
 }
 
-/// What the floats of a sequence are multiplied by to be grey levels, decided by its first frame.
-pub(super) fn float_gain(first: &AnyColourFrame) -> f64 {
-    fn brightest<S: Sample>(frame: &ColourFrame<S>) -> AnyFrame {
-        AnyFrame::F64(frame.map(|pixel| pixel.map(S::to_real::<f64>).into_iter().fold(f64::NAN, f64::max)))
+/// What the floats of a sequence are multiplied by to be grey levels, after one more frame.
+pub(super) fn revised(levels: GreyLevels, frame: &AnyColourFrame) -> GreyLevels {
+    fn brightest<S: Sample>(frame: &ColourFrame<S>) -> [AnyFrame; 1] {
+        [AnyFrame::F64(frame.map(|pixel| pixel.map(S::to_real::<f64>).into_iter().fold(f64::NAN, f64::max)))]
     }
-    match first {
-        AnyColourFrame::U8(_) | AnyColourFrame::U16(_) => GreyLevels::of_integers(),
-        AnyColourFrame::F32(frame) => GreyLevels::decide(&brightest(frame)),
-        AnyColourFrame::F64(frame) => GreyLevels::decide(&brightest(frame)),
+    match frame {
+        AnyColourFrame::U8(_) | AnyColourFrame::U16(_) => levels,
+        AnyColourFrame::F32(frame) => levels.revised(&brightest(frame)),
+        AnyColourFrame::F64(frame) => levels.revised(&brightest(frame)),
     }
-    .float_gain()
 }
 
 /// A frame in grey levels.
