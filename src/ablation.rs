@@ -18,6 +18,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("motion3d.hidden_object", "a motion of all points but one region is reported beside one of all"),
     ("motion3d.leverage", "few points that decide alone are reported as few_points"),
     ("motion3d.region_by_chance", "directions that residuals alone exclude are compared by depths and scores"),
+    ("motion3d.sampled_start", "where the motion found does not explain the flow, that of minimal samples is tried"),
     ("motion3d.basins", "starts from a few steps on a few points"),
     ("flow.brightness_change", "gain and offset between frames are measured and removed"),
     ("flow.weighted_median", "beside motion boundaries a weighted median of the flow is tried"),

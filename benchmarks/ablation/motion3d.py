@@ -49,6 +49,15 @@ def exact(seed: int) -> coverage.Estimated:
     return found, make.u, make.w
 
 
+def narrow(seed: int) -> coverage.Estimated:
+    """Two views of 10 degrees, of a camera that goes forward among near and far points, nearly without noise."""
+    rng, half = np.random.default_rng((seed, 79)), np.tan(np.radians(5.0))
+    points, inv_depth = rng.uniform(-half, half, (20, 2)), 1 / rng.choice([5.0, 15.0], 20)
+    u, w, noise_std = np.array([0.0, 0.0, -1.0]), 0.02 * rng.normal(size=3), 1e-4 * half
+    flow = motion3d.predict_flow(points, u, w, inv_depth, whole_frame=True) + noise_std * rng.normal(size=(20, 2))
+    return motion3d.estimate_motion(points, flow, noise_std=noise_std, threads=1), u, w
+
+
 GROUPS: dict[str, list[Callable[[int], coverage.Estimated]]] = {
     "random": [lambda seed: random_scene(seed, False), lambda seed: random_scene(seed, True)],
     "objects": [lambda seed, ratio=ratio: layouts.thing(seed, ratio) for ratio in (1.0, 20.0, 100.0)]
@@ -58,6 +67,7 @@ GROUPS: dict[str, list[Callable[[int], coverage.Estimated]]] = {
     "planes": [lambda seed, ratio=ratio: layouts.plane(seed, ratio) for ratio in (1.0, 30.0)],
     "views": [lambda seed, depth=depth: layouts.views(seed, depth, 0.05) for depth in ("waves", "plane")],
     "exact": [exact],
+    "narrow": [narrow],
     "lenses": [coverage.long_lens, layouts.band],
     "patches": [coverage.patches],
     "plain": [lambda seed: plain(seed, 1000)],

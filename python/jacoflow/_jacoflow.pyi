@@ -370,7 +370,7 @@ class FlowField:
     @property
     def correlation_length(self) -> float:
         """How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0
-        where they are independent or it is not known.
+        where they are independent or it is not known. Of a stack that of the first field.
         """
     @property
     def model(self) -> str:
@@ -403,8 +403,8 @@ class FlowField:
         NaN where the flow is unknown. Without a Jacobian derivatives read as zero, and quantities of them
         (`divergence`, ...) are refused. `interval` is the time over which the flow is taken: "forward"
         (default), from the field's frame to the next, "central", half the displacement from the frame before
-        to the one after, or "instant", the velocity. ValueError for other shapes or names, negative variances,
-        and covariances that are not symmetric or have a negative eigenvalue.
+        to the one after, or "instant", the velocity. ValueError for other shapes or names, negative
+        variances, and covariances that are not symmetric or have a negative eigenvalue.
         """
     @staticmethod
     def load(path: _Path) -> FlowField:

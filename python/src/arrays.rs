@@ -4,6 +4,7 @@ use super::samples::{exact_samples, is_masked, refuse_path};
 use crate::errors::{Outcome, Raised};
 use jacoflow::buffer_pool;
 use jacoflow::error::{Error, check_memory, shape_text};
+use jacoflow::track::GreyLevels;
 use jacoflow::types::{AnyFrame, Frame, Mask, Sample};
 use numpy::ndarray::{ArrayView, IntoDimension, ShapeBuilder};
 use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
@@ -105,13 +106,19 @@ pub fn frame_with_gaps(argument: &str, object: &Bound<'_, PyAny>, colour: Colour
 }
 
 /// As [`frame_with_gaps`], for trackers, whose thresholds are in grey levels: see [`unmasked`].
-pub fn tracked_frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
+pub fn tracked_frame(
+    argument: &str,
+    object: &Bound<'_, PyAny>,
+    colour: ColourRule,
+    levels: GreyLevels,
+) -> Outcome<AnyFrame> {
     refuse_path(argument, object)?;
-    converted(argument, unmasked(object)?, colour)
+    converted(argument, unmasked(object, levels)?, colour)
 }
 
-/// The array with NaN for masked samples; uint8 and uint16 then become float32 with a white of 1.
-pub fn unmasked<'py>(object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
+/// The array with NaN for masked samples; uint8 and uint16 then become float32 with the white that `levels`
+/// take floats to have.
+pub fn unmasked<'py>(object: &Bound<'py, PyAny>, levels: GreyLevels) -> Outcome<Bound<'py, PyUntypedArray>> {
     let array = native(object)?;
     let white = match dtype_name(&array).as_str() {
         "uint8" => f32::from(u8::MAX),
@@ -121,7 +128,8 @@ pub fn unmasked<'py>(object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntyped
     if !is_masked(&array)? {
         return Ok(array);
     }
-    let scaled = array.call_method1("astype", ("float32",))?.div(white)?;
+    let white_of_floats = f32::from(u8::MAX) / levels.float_gain() as f32;
+    let scaled = array.call_method1("astype", ("float32",))?.mul(white_of_floats / white)?;
     Ok(scaled.cast_into::<PyUntypedArray>()?)
 }
 

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::errors::{Outcome, Raised};
 use jacoflow::error::shape_text;
+use jacoflow::track::GreyLevels;
 use jacoflow::types::{AnyColourFrame, ColourFrame, Frame, Sample};
 use numpy::{Element, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -18,8 +19,8 @@ pub fn colour_frame(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<AnyCol
 }
 
 /// As [`colour_frame`], of masked arrays too, for trackers: see [`unmasked`].
-pub fn colour_frame_with_gaps(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<AnyColourFrame> {
-    converted(argument, unmasked(object)?)
+pub fn tracked_colour_frame(argument: &str, object: &Bound<'_, PyAny>, levels: GreyLevels) -> Outcome<AnyColourFrame> {
+    converted(argument, unmasked(object, levels)?)
 }
 
 fn converted(argument: &str, array: Bound<'_, PyUntypedArray>) -> Outcome<AnyColourFrame> {

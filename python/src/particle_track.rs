@@ -10,11 +10,11 @@ pub use self::tables::write_tables;
 
 use self::options::Given;
 use super::arrays::{self, ColourRule};
-use super::colour_arrays::colour_frame_with_gaps;
+use super::colour_arrays::tracked_colour_frame;
 use crate::errors::Outcome;
 use crate::interrupt::{Held, interruptible};
 use jacoflow::error::Error;
-use jacoflow::track::ParticleTracker;
+use jacoflow::track::{GreyLevels, ParticleTracker};
 use jacoflow::types::{AnyColourFrame, AnyFrame, Frame, TargetBox};
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
@@ -35,7 +35,7 @@ impl PyParticleTracker {
     fn new(frame: &Bound<'_, PyAny>, boxes: Vec<(u64, [f64; 4])>, options: &Bound<'_, PyDict>) -> Outcome<Self> {
         let (options, takes_grey) = options.extract::<Given>()?.options()?;
         let py = frame.py();
-        let frame = coloured(frame, takes_grey)?;
+        let frame = coloured(frame, takes_grey, GreyLevels::of_integers())?;
         let boxes: Vec<(u64, TargetBox)> = boxes.into_iter().map(|(id, sides)| (id, target_box(sides))).collect();
         let tracker = interruptible(py, || ParticleTracker::new(&frame, &boxes, &options))?;
         Ok(Self { tracker: Held::new(tracker), takes_grey })
@@ -45,7 +45,8 @@ impl PyParticleTracker {
     /// known.
     fn update(&self, frame: &Bound<'_, PyAny>, camera: Option<[[f64; 3]; 2]>) -> Outcome<PyParticleStep> {
         let py = frame.py();
-        let frame = coloured(frame, self.takes_grey)?;
+        let levels = self.tracker.with(py, |tracker| tracker.grey_levels())?;
+        let frame = coloured(frame, self.takes_grey, levels)?;
         let record = self.tracker.change(py, |tracker| {
             tracker.update_with_camera(&frame, camera)?;
             Ok::<_, Error>(tracker.record())
@@ -89,14 +90,14 @@ fn target_box([x, y, width, height]: [f64; 4]) -> TargetBox {
 }
 
 /// A frame (H, W, 3), or (H, W) where grey is taken.
-fn coloured(object: &Bound<'_, PyAny>, takes_grey: bool) -> Outcome<AnyColourFrame> {
+fn coloured(object: &Bound<'_, PyAny>, takes_grey: bool, levels: GreyLevels) -> Outcome<AnyColourFrame> {
     fn grey<T: Copy>(frame: &Frame<T>) -> Frame<[T; 3]> {
         frame.map(|&value| [value; 3])
     }
-    if !(takes_grey && arrays::unmasked(object)?.ndim() == 2) {
-        return colour_frame_with_gaps("frame", object);
+    if !(takes_grey && arrays::unmasked(object, levels)?.ndim() == 2) {
+        return tracked_colour_frame("frame", object, levels);
     }
-    Ok(match arrays::tracked_frame("frame", object, ColourRule::Refuse)? {
+    Ok(match arrays::tracked_frame("frame", object, ColourRule::Refuse, levels)? {
         AnyFrame::U8(frame) => AnyColourFrame::U8(grey(&frame)),
         AnyFrame::U16(frame) => AnyColourFrame::U16(grey(&frame)),
         AnyFrame::F32(frame) => AnyColourFrame::F32(grey(&frame)),

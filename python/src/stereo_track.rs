@@ -46,6 +46,13 @@ impl Tracking {
     }
 }
 
+impl PyStereoTracker {
+    /// What floats are taken for so far.
+    fn levels(&self, py: Python<'_>) -> Outcome<GreyLevels> {
+        Ok(self.0.with(py, |tracking| tracking.levels)?.unwrap_or(GreyLevels::of_integers()))
+    }
+}
+
 #[pymethods]
 impl PyStereoTracker {
     #[new]
@@ -62,9 +69,10 @@ impl PyStereoTracker {
         dt: Option<f64>,
     ) -> Outcome<Bound<'py, PyDict>> {
         let py = left.py();
+        let levels = self.levels(py)?;
         let views = [
-            arrays::tracked_frame("left", left, ColourRule::Luminance)?,
-            arrays::tracked_frame("right", right, ColourRule::Luminance)?,
+            arrays::tracked_frame("left", left, ColourRule::Luminance, levels)?,
+            arrays::tracked_frame("right", right, ColourRule::Luminance, levels)?,
         ];
         let step = self
             .0
@@ -81,8 +89,8 @@ impl PyStereoTracker {
         dt: Option<f64>,
     ) -> Outcome<Bound<'py, PyDict>> {
         let py = left.py();
-        let left = arrays::tracked_frame("left", left, ColourRule::Luminance)?;
-        let disparity = match arrays::tracked_frame("disparity", disparity, ColourRule::Refuse)? {
+        let left = arrays::tracked_frame("left", left, ColourRule::Luminance, self.levels(py)?)?;
+        let disparity = match arrays::frame_with_gaps("disparity", disparity, ColourRule::Refuse)? {
             map @ (AnyFrame::F32(_) | AnyFrame::F64(_)) => map.to_real::<f32>(),
             other => {
                 let message = format!("disparity: expected an array of float32 or float64, got {}", other.dtype());

@@ -40,7 +40,7 @@ pub(super) fn begin(
         (None, Some(at)) => Start::Centre(at),
         (None, None) => Start::Motion,
     };
-    let frame_of = arrays::tracked_frame("frame", frame, ColourRule::Refuse)?;
+    let frame_of = arrays::tracked_frame("frame", frame, ColourRule::Refuse, GreyLevels::of_integers())?;
     let levels = GreyLevels::decide(&frame_of);
     let tracker = interruptible(frame.py(), || method(&levels.convert(&frame_of), start))?;
     Ok(PyGradientTracker(Held::new(Following { tracker, levels })))
@@ -72,7 +72,8 @@ impl PyGradientTracker {
     /// The target in the next frame, as a dictionary.
     fn update<'py>(&self, frame: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyDict>> {
         let py = frame.py();
-        let frame = arrays::tracked_frame("frame", frame, ColourRule::Refuse)?;
+        let levels = self.0.with(py, |following| following.levels)?;
+        let frame = arrays::tracked_frame("frame", frame, ColourRule::Refuse, levels)?;
         let state = self.0.change(py, |following| {
             let levels = following.levels.revised(std::slice::from_ref(&frame));
             let state = following.tracker.update(&levels.convert(&frame))?;

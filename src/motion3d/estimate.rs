@@ -21,9 +21,13 @@ use super::solver::finite_rotation::{settle, shift};
 use super::solver::likelihood::{Candidate, choose, minima, near_best, smoothed};
 use super::solver::profile_likelihood::ProfileLikelihood;
 use super::solver::refine::{Minimum, StoppingCriteria, refine};
+use crate::ablation::keeps;
 use crate::error::Result;
 use crate::math::{by_chance, random::CounterRng};
 use crate::scattered::SiteSmoother;
+
+/// Mean square of residuals in the noise given, beyond which a motion does not explain the flow.
+const MISFIT: f64 = 9.0;
 
 /// The rigid motion that explains a flow field, with covariance and depths.
 ///
@@ -90,7 +94,8 @@ fn estimate(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions) -> Moti
     }
     if !options.robust {
         let inliers = scaled.observations.clone();
-        return Task { whitening: &whitening, options, known: None, rng }.on(&mut scaled, inliers);
+        let found = Task { whitening: &whitening, options, known: None, rng }.on(&mut scaled, inliers);
+        return explained(flow, noise, options, found);
     }
     let Some(kept) = consensus(&whitening, &mut scaled, rng.stream(1)) else {
         return MotionEstimate::nothing(flow.len(), Status::IllConditioned, scaled.noise_std);
@@ -125,6 +130,25 @@ struct Task<'a, 'b> {
     /// What a robust search found.
     known: Option<&'a Consensus>,
     rng: CounterRng,
+}
+
+/// `found`, or where it does not explain the flow in the noise given, what a search by minimal samples leads
+/// to if that explains more of it: nearly exact displacements have narrow minima.
+fn explained(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions, found: MotionEstimate) -> MotionEstimate {
+    let misfit = |found: &MotionEstimate| {
+        let squares = found.residuals.iter().filter(|rest| rest.is_finite()).map(|rest| rest * rest);
+        squares.sum::<f64>() / found.residuals.len().max(1) as f64
+    };
+    let is_settled = matches!(noise, Noise::Unknown) || options.initial.is_some() || misfit(&found) < MISFIT;
+    if is_settled || !keeps("motion3d.sampled_start") {
+        return found;
+    }
+    let sampled = estimate(flow, noise, &MotionOptions { robust: true, ..options.clone() });
+    if !sampled.motion.translation[0].is_finite() {
+        return found;
+    }
+    let again = estimate(flow, noise, &MotionOptions { initial: Some(sampled.motion), ..options.clone() });
+    if misfit(&again) < misfit(&found) { again } else { found }
 }
 
 impl Task<'_, '_> {

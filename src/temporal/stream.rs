@@ -179,7 +179,12 @@ impl<T: SimdReal> FlowStream<T> {
     fn set_period(&self, field: &mut FlowField<T>, k: usize) {
         let steps = self.times.len().saturating_sub(1);
         let mean = || Some((0..steps).map(|k| self.step(k)).sum::<Option<f64>>()? / steps.max(1) as f64);
-        let period = if field.layout.interval == Interval::Forward { self.step(k) } else { mean() };
+        let period = match field.layout.interval {
+            Interval::Forward => self.step(k),
+            // Backward differences at the newest frame.
+            Interval::Instant if k > 0 && k == steps => self.step(k - 1),
+            _ => mean(),
+        };
         if period.is_some() {
             field.convert(Units { frame_period: period, ..field.layout.units.clone() });
         }

@@ -5,6 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
+from jacoflow.scenes import TargetScene
 from jacoflow.track import GradientTracker, ParticleTracker, StereoTracker
 
 HEIGHT, WIDTH = 90, 120
@@ -123,3 +124,35 @@ def test_the_type_of_particle_frames_may_change(gain):
     for frame in plain[1:]:
         step, changed = same.update(frame), other.update(frame.astype(np.float64) * gain)
         np.testing.assert_allclose(changed.boxes, step.boxes, atol=1e-3)
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+def test_masked_integers_after_floats_are_as_bright(dtype):
+    frames, centres = scene(8)
+    tracker = GradientTracker(frames[0], bbox=(*(centres[0] - 9.5), 19, 19))
+    whole = np.ma.masked_array(np.round(frames * (257 if dtype == "uint16" else 1)).astype(dtype), np.zeros(frames.shape, bool))
+    found = [tracker.update(frame) for frame in whole[1:]]
+    assert {result.status for result in found} == {"tracking"}
+    assert found[-1].gain == pytest.approx(1, abs=0.05)
+
+
+def test_a_box_that_the_first_frame_does_not_show_is_refused():
+    frames, centres = scene(1)
+    frames[0, 25:60, 10:50] = np.nan
+    with pytest.raises(ValueError, match=r"^bbox: expected a box of which the first frame shows at least half, got 0 of \d+ samples"):
+        GradientTracker(frames[0], bbox=(*(centres[0] - 9.5), 19, 19))
+
+
+def test_scattered_missing_pixels_leave_corners():
+    scenes = TargetScene("people_static", scale=0.5, frames=20)
+    boxes, rng = np.array(scenes.boxes()[:20]), np.random.default_rng(1)
+    for t in range(20):
+        frame = scenes.frame(t)
+        hidden = np.repeat((rng.random(frame.shape[:2]) < 0.02)[..., None], 3, axis=2)
+        seen = np.ma.masked_array(frame, hidden)
+        if t == 0:
+            tracker = ParticleTracker(seen, boxes[0])
+        else:
+            step = tracker.update(seen)
+    assert set(step.reason) == {""}
+    assert np.linalg.norm(step.position - boxes[19][:, :2] - boxes[19][:, 2:] / 2, axis=1).max() < 12

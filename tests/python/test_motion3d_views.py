@@ -81,3 +81,19 @@ def test_directions_in_narrow_fields_are_as_unsure_as_they_say():
     # The opposite direction explains some of them nearly as well.
     assert np.mean(np.array(off) > 4) <= 0.03
     assert np.mean(np.array(off) > 2) <= 0.1
+
+
+def test_forward_motion_is_found_in_narrow_fields_nearly_without_noise():
+    """Displacements so exact that a search which leaves out their second order ends elsewhere."""
+    rng, half, wrong, misfits = np.random.default_rng(5), np.tan(np.radians(5.0)), 0, 0
+    u = np.array([0.0, 0.0, -1.0])
+    for _ in range(40):
+        clusters = rng.uniform(-0.8 * half, 0.8 * half, (3, 2))
+        points = clusters[np.arange(30) % 3] + rng.uniform(-0.15 * half, 0.15 * half, (30, 2))
+        w, noise_std = 0.02 * rng.normal(size=3), 1e-4 * half
+        flow = motion3d.predict_flow(points, u, w, 1 / rng.choice([5.0, 15.0], 30), whole_frame=True)
+        found = motion3d.estimate_motion(points, flow + noise_std * rng.normal(size=(30, 2)), noise_std=noise_std)
+        off = np.degrees(np.arccos(np.clip(found.translation @ u, -1, 1)))
+        wrong += found.status == "ok" and off > 4 * found.direction_std
+        misfits += np.sqrt(np.mean(found.residuals**2)) > 5
+    assert wrong == 0 and misfits <= 2

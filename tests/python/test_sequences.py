@@ -135,6 +135,27 @@ def test_times_of_frames_decide_rates(frames):
     assert_allclose([found[k].frame_period for k in (1, 2, 3)], [period, 2 * period, period])
 
 
+def test_backward_differences_go_by_the_last_step():
+    """Steady motion; the second difference knows nothing of uneven steps."""
+    motion = {"u": 5.0, "v": -2.0, "u_x": 0.0, "u_y": 0.0, "v_x": 0.0, "v_y": 0.0}
+    scene = jacoflow.scenes.Scene("affine", width=96, height=72, **motion)
+    estimator = jacoflow.FlowEstimator(method=jacoflow.Windowed(time_scheme="backward"))
+    rng, times = np.random.default_rng(1), [0.0, 0.1, 0.2, 0.3, 0.37, 0.55, 0.6, 0.65]
+    fields = [estimator.push(scene.frame(time) + rng.normal(size=(72, 96)), time=time) for time in times][2:]
+    assert_allclose([field.frame_period for field in fields], np.diff(times)[1:], rtol=1e-9)
+    assert_allclose([np.median(inner(field.u)) for field in fields], 5.0, rtol=0.2)
+
+
+def test_fields_of_a_stack_are_those_of_their_frames(frames):
+    """Index, time and correlation length too: the first field is that of a pair."""
+    stack, first, later = jacoflow.estimate(frames[:4]), jacoflow.flow(*frames[:2]), jacoflow.flow(*frames[:3])
+    for again in (stack, pickle.loads(pickle.dumps(stack))):
+        assert [again[0].correlation_length, again[1].correlation_length] == [first.correlation_length, later.correlation_length]
+        assert again[1].measure("u").std == later.measure("u").std
+        assert again.frame_index == 0 and again[1:].frame_index == 1
+    assert [field.frame_index for field in jacoflow.estimate(frames[:4], pairs=True)] == [0, 2]
+
+
 def test_times_that_cannot_be_are_refused(frames):
     estimator = jacoflow.FlowEstimator()
     estimator.push(frames[0], time=2.0)

@@ -21,7 +21,7 @@ use std::sync::Arc;
 pub use derived::quantities;
 pub use measurement::Measurement;
 pub use measurement::restore_measurement;
-pub use packed::Packed;
+pub use packed::{Note, Packed};
 pub use state::{restore_field, status_names};
 
 /// Both precisions.
@@ -203,7 +203,12 @@ impl FlowField {
 
     /// Frame index of the first field.
     pub fn first_frame(&self) -> usize {
-        self.layout().frame_index + self.start
+        self.note().map_or(0, |note| note.frame_index)
+    }
+
+    /// What the first field does not share with others of the stack.
+    fn note(&self) -> Option<Note> {
+        each!(self.store, packed => packed.notes.get(self.start).copied())
     }
 
     /// Field `index` of those shown, as the core takes it.

@@ -5,11 +5,29 @@ use jacoflow::error::{Error, Result};
 use jacoflow::math::Real;
 use jacoflow::types::{FieldLayout, FlowField as CoreField, Status};
 
+/// What fields of one stack differ in.
+#[derive(Debug, Clone, Copy)]
+pub struct Note {
+    /// Index of the field's frame.
+    pub frame_index: usize,
+    /// Seconds between its frames.
+    pub period: Option<f64>,
+    /// Length, px, over which its errors go together.
+    pub correlation_length: f64,
+}
+
+impl Note {
+    fn of(layout: &FieldLayout) -> Self {
+        let FieldLayout { frame_index, correlation_length, .. } = *layout;
+        Self { frame_index, period: layout.units.frame_period, correlation_length }
+    }
+}
+
 /// `count` fields of one layout: for each plane-wise quantity the planes of frame 0, then those of frame 1,
 /// and so on.
 #[derive(Debug, Clone)]
 pub struct Packed<T: Real> {
-    /// Layout of the first field; the frame index counts up from it.
+    /// Layout of the first field; of the others it differs by their notes.
     pub layout: FieldLayout,
     /// Columns.
     pub width: usize,
@@ -17,8 +35,8 @@ pub struct Packed<T: Real> {
     pub height: usize,
     /// Number of fields.
     pub count: usize,
-    /// Seconds between the frames of each field; not of one length where frames came unevenly.
-    pub periods: Vec<Option<f64>>,
+    /// Of each field.
+    pub notes: Vec<Note>,
     /// `count * P` planes.
     pub motion: Vec<T>,
     /// `count * P (P + 1) / 2` planes.
@@ -42,7 +60,7 @@ impl<T: Real> Packed<T> {
             width: field.width,
             height: field.height,
             count: 1,
-            periods: vec![field.layout.units.frame_period],
+            notes: vec![Note::of(&field.layout)],
             motion: field.motion,
             covariance: field.covariance,
             // In place: the codes are as large as the status.
@@ -60,7 +78,7 @@ impl<T: Real> Packed<T> {
         if (field.width, field.height) != (self.width, self.height) || field.motion.len() != self.stride() {
             return Err(Error::argument("frames", "fields of one size and model", "fields that differ"));
         }
-        self.periods.push(field.layout.units.frame_period);
+        self.notes.push(Note::of(&field.layout));
         extend_from(&mut self.motion, field.motion);
         self.status.extend(field.status.iter().map(|&s| s as u8));
         extend(&mut self.covariance, field.covariance);
@@ -90,8 +108,9 @@ impl<T: Real> Packed<T> {
         };
         let sites = index * self.site_count()..(index + 1) * self.site_count();
         let mut layout = self.layout.clone();
-        layout.frame_index += index;
-        layout.units.frame_period = self.periods[index];
+        let note = self.notes[index];
+        (layout.frame_index, layout.correlation_length) = (note.frame_index, note.correlation_length);
+        layout.units.frame_period = note.period;
         CoreField {
             layout,
             width: self.width,

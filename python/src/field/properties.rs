@@ -73,7 +73,7 @@ getters! {
     /// Size (width, height) of the frames, px.
     frame_size(this) -> (usize, usize) = this.layout().frame_size;
     /// Seconds between frames, or None; of the first field of a stack.
-    frame_period(this) -> Option<f64> = each!(this.store, packed => packed.periods.get(this.start).copied().flatten());
+    frame_period(this) -> Option<f64> = this.note().and_then(|note| note.period);
     /// Physical size (dx, dy) of a pixel, 1 px or any length unit.
     pixel_pitch(this) -> (f64, f64) = this.layout().units.pixel_pitch;
     /// Name of the unit of lengths, "px" unless there is a pixel pitch.
@@ -82,8 +82,8 @@ getters! {
     /// before and after; "instant", the velocity at frame t (no unit).
     interval(this) -> &'static str = this.layout().interval.name();
     /// How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0
-    /// where they are independent or it is not known.
-    correlation_length(this) -> f64 = this.layout().correlation_length;
+    /// where they are independent or it is not known. Of a stack that of the first field.
+    correlation_length(this) -> f64 = this.note().map_or(0.0, |note| note.correlation_length);
     /// Names of the model's parameters; `unit(name)` gives their units.
     parameters(this, slf) -> Outcome<Bound<'py, PyTuple>> = Ok(PyTuple::new(slf.py(), &this.layout().parameters)?);
 }
@@ -137,8 +137,8 @@ impl FlowField {
     /// NaN where the flow is unknown. Without a Jacobian derivatives read as zero, and quantities of them
     /// (`divergence`, ...) are refused. `interval` is the time over which the flow is taken: "forward"
     /// (default), from the field's frame to the next, "central", half the displacement from the frame before
-    /// to the one after, or "instant", the velocity. ValueError for other shapes or names, negative variances,
-    /// and covariances that are not symmetric or have a negative eigenvalue.
+    /// to the one after, or "instant", the velocity. ValueError for other shapes or names, negative
+    /// variances, and covariances that are not symmetric or have a negative eigenvalue.
     #[staticmethod]
     #[pyo3(signature = (flow, covariance = None, jacobian = None, *, interval = None))]
     fn from_arrays(

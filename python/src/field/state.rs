@@ -1,6 +1,6 @@
 //! A field as a dictionary of arrays and plain values, and back: what pickling needs.
 
-use super::{FlowField, Packed, Store, Stored, each};
+use super::{FlowField, Note, Packed, Store, Stored, each};
 use crate::arrays;
 use crate::errors::{Outcome, Raised};
 use jacoflow::error::{Error, shape_text};
@@ -9,6 +9,13 @@ use numpy::{PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+/// A note as plain values.
+type PlainNote = (usize, Option<f64>, f64);
+
+fn of_plain((frame_index, period, correlation_length): PlainNote) -> Note {
+    Note { frame_index, period, correlation_length }
+}
+
 /// Everything that makes a field, copied out of the memory it may share with others.
 pub fn save<'py>(field: &FlowField, py: Python<'py>) -> Outcome<Bound<'py, PyDict>> {
     let state = layout_state(py, field.layout())?;
@@ -16,9 +23,9 @@ pub fn save<'py>(field: &FlowField, py: Python<'py>) -> Outcome<Bound<'py, PyDic
     state.set_item("stack", field.stack)?;
     state.set_item("count", field.count)?;
     each!(field.store, packed => {
-        state.set_item("periods", &packed.periods[field.start..field.start + field.count])?;
-        state.set_item("correlation_length", packed.layout.correlation_length)?;
-        state.set_item("frame_index", packed.layout.frame_index + field.start)?;
+        let notes = &packed.notes[field.start..field.start + field.count];
+        let notes: Vec<PlainNote> = notes.iter().map(|n| (n.frame_index, n.period, n.correlation_length)).collect();
+        state.set_item("notes", notes)?;
         let part = |total: usize| {
             let length = total / packed.count.max(1);
             field.start * length..(field.start + field.count) * length
@@ -77,10 +84,11 @@ fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> Outcome<FlowField> {
     };
     let interval = Interval::parse(&required(state, "interval")?.extract::<String>()?)?;
     let count: usize = required(state, "count")?.extract()?;
-    let periods: Vec<Option<f64>> = required(state, "periods")?.extract()?;
-    if periods.len() != count {
-        return Err(Error::argument("state", format!("{count} periods"), periods.len()).into());
+    let notes: Vec<PlainNote> = required(state, "notes")?.extract()?;
+    if notes.len() != count {
+        return Err(Error::argument("state", format!("{count} notes"), notes.len()).into());
     }
+    let (frame_index, frame_period, correlation_length) = notes.first().copied().unwrap_or((0, None, 0.0));
     let layout = FieldLayout {
         frame_size: required(state, "frame_size")?.extract()?,
         sites,
@@ -89,11 +97,11 @@ fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> Outcome<FlowField> {
         units: Units {
             pixel_pitch: required(state, "pixel_pitch")?.extract()?,
             length: required(state, "length_unit")?.extract()?,
-            frame_period: periods.first().copied().flatten(),
+            frame_period,
         },
         interval,
-        frame_index: required(state, "frame_index")?.extract()?,
-        correlation_length: required(state, "correlation_length")?.extract()?,
+        frame_index,
+        correlation_length,
     };
     let (width, height) = layout.sites.shape(layout.frame_size)?;
     let (sites, parameters) = (width * height * count, layout.parameters.len());
@@ -101,7 +109,7 @@ fn restore<T: Stored>(state: &Bound<'_, PyDict>) -> Outcome<FlowField> {
         width,
         height,
         count,
-        periods,
+        notes: notes.into_iter().map(of_plain).collect(),
         motion: plane::<T>(state, "motion", sites * parameters)?.ok_or_else(|| missing("motion"))?,
         covariance: plane(state, "covariance", sites * parameters * (parameters + 1) / 2)?,
         status: plane(state, "status", sites)?.ok_or_else(|| missing("status"))?,

@@ -2,7 +2,7 @@
 
 use super::region::check;
 use super::{Motion, Quantity, RegionMotion, unbiased_value_and_std, value_and_std};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FlowField, MOTION_NAMES, Units};
 
@@ -23,7 +23,12 @@ impl Measured {
     pub fn parse(name: &str) -> Result<Self> {
         match MOTION_NAMES.iter().position(|known| *known == name) {
             Some(place) => Ok(Self::Parameter(place)),
-            None => Quantity::parse(name).map(Self::Derived),
+            None => Quantity::parse(name).map(Self::Derived).map_err(|error| match error {
+                Error::Argument { argument, expected, got } => {
+                    Error::Argument { argument, expected: format!("{}, {expected}", MOTION_NAMES.join(", ")), got }
+                }
+                other => other,
+            }),
         }
     }
 

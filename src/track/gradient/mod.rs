@@ -87,8 +87,8 @@ impl GradientTracker {
     /// until then its status is lost and its box empty.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `frame` (smaller than 16 px a side, mostly not finite), `bbox` (a side under
-    /// 3 px, wholly outside, not finite) or `center` (outside).
+    /// [`Error::Argument`] naming `frame` (smaller than 16 px a side, mostly not finite), `bbox` (a side
+    /// under 3 px, wholly outside or not shown, not finite) or `center` (outside).
     pub fn new(frame: &Frame<f64>, start: Start, options: &GradientOptions) -> Result<Self> {
         Self::begin(frame, start, Method::Layered(options.clone()))
     }
@@ -104,10 +104,14 @@ impl GradientTracker {
     }
 
     fn begin(frame: &Frame<f64>, start: Start, method: Method) -> Result<Self> {
-        let frame = &*start::first_frame(frame)?;
+        let (whole, frame) = (frame, &*start::first_frame(frame)?);
         let waiting = |near| Engine::Waiting(Waiting::new(frame, near));
         let (state, engine) = match start {
-            Start::Box(bounds) => method.begin(frame, start::checked_box(bounds, frame.size())?),
+            Start::Box(bounds) => {
+                let bounds = start::checked_box(bounds, frame.size())?;
+                start::check_shown(whole, bounds)?;
+                method.begin(frame, bounds)
+            }
             Start::Centre(at) => (start::nothing_yet(start::checked_point(at, frame.size())?), waiting(Some(at))),
             Start::Motion => {
                 let middle = [frame.width(), frame.height()].map(|length| length as f64 / 2.0 - 0.5);

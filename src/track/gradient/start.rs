@@ -85,16 +85,39 @@ pub(super) fn completed(frame: &Frame<f64>) -> Option<Cow<'_, Frame<f64>>> {
     })
 }
 
+/// Also false for NaN.
+fn is_brightness(sample: f64) -> bool {
+    sample.abs() <= GREATEST
+}
+
 /// The frame with NaN for missing samples; `None` where more than half are missing.
 pub(super) fn seen(frame: &Frame<f64>) -> Option<Cow<'_, Frame<f64>>> {
-    // Also false for NaN.
-    let is_brightness = |sample: &f64| sample.abs() <= GREATEST;
-    let missing = frame.data().iter().filter(|sample| !is_brightness(sample)).count();
+    let missing = frame.data().iter().filter(|sample| !is_brightness(**sample)).count();
     match missing {
         0 => Some(Cow::Borrowed(frame)),
         _ if 2 * missing > frame.data().len() => None,
-        _ => Some(Cow::Owned(frame.map(|sample| if is_brightness(sample) { *sample } else { f64::NAN }))),
+        _ => Some(Cow::Owned(frame.map(|sample| if is_brightness(*sample) { *sample } else { f64::NAN }))),
     }
+}
+
+/// Refuses a box of which the frame shows less than half.
+pub(super) fn check_shown(frame: &Frame<f64>, bounds: TargetBox) -> Result<()> {
+    let inside = |at: usize, from: f64, length: f64| at as f64 >= from && at as f64 <= from + length;
+    let rows = (0..frame.height()).filter(|&y| inside(y, bounds.y, bounds.height));
+    let samples = rows.flat_map(|y| {
+        let row = frame.row(y).iter().enumerate();
+        row.filter(|(x, _)| inside(*x, bounds.x, bounds.width)).map(|(_, sample)| *sample)
+    });
+    let (shown, missing): (Vec<f64>, Vec<f64>) = samples.partition(|sample| is_brightness(*sample));
+    if missing.len() > shown.len() {
+        let expected = "a box of which the first frame shows at least half";
+        return Err(Error::argument(
+            "bbox",
+            expected,
+            format!("{} of {} samples", shown.len(), shown.len() + missing.len()),
+        ));
+    }
+    Ok(())
 }
 
 pub(super) fn checked_box(bounds: TargetBox, (width, height): (usize, usize)) -> Result<TargetBox> {

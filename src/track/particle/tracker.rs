@@ -198,6 +198,11 @@ impl ParticleTracker {
         Ok(&self.step)
     }
 
+    /// What samples of floats are taken for so far.
+    pub fn grey_levels(&self) -> GreyLevels {
+        GreyLevels::of_floats(self.gain)
+    }
+
     /// The targets at the last frame.
     pub fn step(&self) -> &ParticleStep {
         &self.step
@@ -222,9 +227,9 @@ impl ParticleTracker {
     }
 
     fn advance(&mut self, frame: &AnyColourFrame, known: Option<CameraMotion>) -> Result<()> {
-        self.gain = revised(GreyLevels::of_floats(self.gain), frame).float_gain();
+        self.gain = revised(self.grey_levels(), frame).float_gain();
         let view = View::new(frame, self.gain, self.options.uses("particle.values"));
-        if view.is_empty() {
+        if view.is_empty {
             self.frame += 1;
             self.missed.push(known.map(CameraMotion::to_affine));
             self.coast();

@@ -1,9 +1,11 @@
 //! A frame as the tracker sees it: colour bins and grey levels.
 
 use super::bins::colour_bins;
+use crate::image::fill_holes;
 use crate::parallel::for_each_band;
 use crate::track::GreyLevels;
 use crate::types::{AnyColourFrame, AnyFrame, ColourFrame, Frame, Sample};
+use std::borrow::Cow;
 
 /// Weights of red, green and blue in the brightness (ITU-R BT.601).
 const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
@@ -12,7 +14,10 @@ const LUMA: [f32; 3] = [0.299, 0.587, 0.114];
 pub(super) struct View {
     pub colour: ColourFrame<f32>,
     pub bins: Frame<u8>,
+    /// A smooth continuation where pixels are missing, so that corners nearby are seen.
     pub grey: Frame<f32>,
+    /// Whether no pixel is finite: the frame shows nothing.
+    pub is_empty: bool,
 }
 
 impl View {
@@ -28,12 +33,11 @@ impl View {
                 *out = LUMA[0] * r + LUMA[1] * g + LUMA[2] * b;
             }
         });
-        Self { colour, bins, grey }
-    }
-
-    /// Whether no pixel is finite: the frame shows nothing.
-    pub fn is_empty(&self) -> bool {
-        !self.grey.data().iter().any(|value| value.is_finite())
+        let is_empty = !grey.data().iter().any(|value| value.is_finite());
+        if let Cow::Owned(filled) = fill_holes(&grey, None) {
+            grey = filled;
+        }
+        Self { colour, bins, grey, is_empty }
     }
 }
 
