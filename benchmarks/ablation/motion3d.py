@@ -50,9 +50,12 @@ def exact(seed: int) -> coverage.Estimated:
 
 
 def narrow(seed: int) -> coverage.Estimated:
-    """Two views of 10 degrees, of a camera that goes forward among near and far points, nearly without noise."""
+    """Two views of 10 degrees, of a camera that goes forward among clusters of near and far points, nearly
+    without noise."""
     rng, half = np.random.default_rng((seed, 79)), np.tan(np.radians(5.0))
-    points, inv_depth = rng.uniform(-half, half, (20, 2)), 1 / rng.choice([5.0, 15.0], 20)
+    clusters = rng.uniform(-0.8 * half, 0.8 * half, (3, 2))
+    points = clusters[np.arange(20) % 3] + rng.uniform(-0.15 * half, 0.15 * half, (20, 2))
+    inv_depth = 1 / rng.choice([5.0, 15.0], 20)
     u, w, noise_std = np.array([0.0, 0.0, -1.0]), 0.02 * rng.normal(size=3), 1e-4 * half
     flow = motion3d.predict_flow(points, u, w, inv_depth, whole_frame=True) + noise_std * rng.normal(size=(20, 2))
     return motion3d.estimate_motion(points, flow, noise_std=noise_std, threads=1), u, w
