@@ -34,7 +34,7 @@ def test_slopes_are_near_the_noise_bound_of_the_windows_they_rest_on(name):
     """Least squares with exact gradients and nothing but noise would have the bound; what is asked of the mean is 1.7 times it."""
     ours = contestant(name)
     cases = [controlled.Case(64.0, 4.0, 3.0), controlled.Case(256.0, 2.0, 3.0)]
-    # Three frames are farther from what is asked.
+    # Three frames are farther from the bound.
     cases += [controlled.Case(64.0, 1.0, 3.0)] if ours.frames == 2 else []
     ratios = np.array([ours.errors(case)[2] / ours.bound(case) for case in cases])
     print(f"{name}: {ratios}")

@@ -12,7 +12,7 @@ LESS = (
     *("noise 5 to 1", " 1 to 1", "10 to 1", "20 to 1", "30 to 1", "50 to 1"),
     *("waves, noise 0.03 of the displacement", "waves, noise 0.1 of the displacement", "cloud, noise 0.1 of the displacement", "plane, noise 0.01 of the displacement"),
 )
-"""Ends of the names of rows left out: shorter axes of the noise, less of it, layouts and depths that are like others. A thing that moves by itself in even noise is in `test_motion3d_points`."""
+"""Ends of the names of rows left out: shorter axes of the noise, less of it, layouts and depths that are like others. A moving object in even noise is in `test_motion3d_points`."""
 ROWS = {part: [name for name in layouts.cases([part]) if not name.endswith(LESS)] for part in ("layouts", "noise", "things", "planes", "views")}
 
 

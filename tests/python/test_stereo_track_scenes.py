@@ -155,7 +155,7 @@ def test_the_papers_mode_on_the_crossing_is_the_specifications_in_the_mean():
 
 @pytest.mark.parametrize("scene", [crossing, cart])
 def test_a_missing_pair_changes_no_name(scene):
-    """Nobody is told that twice the time went by: the cart recedes by 6 px of disparity at once, which is a jump but for all of it being seen there."""
+    """Twice the time went by without `dt`: the cart recedes by 6 px of disparity at once, which is a jump but for all of it being seen there."""
     sequence = drawn(scene())[:9]
     scores = scored(scene(), "improved", [*sequence[:4], *sequence[5:]])
     assert scores.id_share(1) == 1.0 and scores.id_share(2) == 1.0
@@ -167,8 +167,8 @@ def test_who_goes_away_among_objects_at_rest_is_followed():
     assert scores.purity() >= 0.952
     assert scores.recall(1) >= 0.956 and scores.recall(2) >= 0.959
     assert scores.path(1) == 8 and scores.id_kept(1) == 10
-    for told in ("affine", "velocity"):
-        assert (np.median(scores.motion_errors(told)[1], axis=0) <= (0.02, 0.02, 0.022)).all()
+    for kind in ("affine", "velocity"):
+        assert (np.median(scores.motion_errors(kind)[1], axis=0) <= (0.02, 0.02, 0.022)).all()
     # Beside the median of the truth, as 5.2 words it, by which one row of its outline too many makes 0.065 along y.
     u, v, w = np.median(scores.motion_errors("median")[1], axis=0)
     assert u <= 0.02 and v < 0.065 and w <= 0.022
@@ -201,8 +201,8 @@ def test_what_comes_nearer_is_one_group_and_its_parts_show_their_motion():
     scores = scored(curved(), "improved")
     single, share, precision = scores.grouped(1)
     assert single < 0.5 and share >= 0.96 and precision >= 0.93
-    for told in ("affine", "velocity", "median"):
-        assert (np.median(scores.motion_errors(told)[1], axis=0) <= 0.02).all()
+    for kind in ("affine", "velocity", "median"):
+        assert (np.median(scores.motion_errors(kind)[1], axis=0) <= 0.02).all()
     assert scores.purity() >= 0.962 and scores.recall(1) >= 0.979 and scores.recall(2) >= 0.959
 
 

@@ -40,7 +40,7 @@ def test_a_frame_that_shows_nothing_is_not_tracked_in_right_after_the_first(brig
 @pytest.mark.parametrize("value", [1e10, -1e18, 1e30, 1.7e308])
 @pytest.mark.parametrize("white", [1.0, 255.0])
 def test_numbers_that_are_no_brightness_do_no_harm_later(value, white):
-    """A whole frame of them, or with them added, cannot be used; some pixels on the target are hidden. Whatever floats are taken for."""
+    """A whole frame of them, or with them added, cannot be used; some pixels on the target are hidden; of either white of floats."""
     scene = tracking_scenes.simulation(1, "smooth:4,90,20", 20.0)
     frames = scene.frames() * (white / 255.0)
     x, y, w, h = scene.boxes[22].astype(int)

@@ -24,7 +24,7 @@ def test_support_adapts_to_wrong_boxes(right, down, larger):
         wrong = dataclasses.replace(scene, start=(x + right + w * (1 - larger) / 2, y + down + h * (1 - larger) / 2, w * larger, h * larger))
         found = follow(wrong)
         off = np.linalg.norm(found.position - scene.centres, axis=1)
-        # An even target does not tell where in it a smaller box is, until its edges are learnt.
+        # An even target does not show where in it a smaller box is, until its edges are learnt.
         assert off[1:].max() <= (3.0 if larger >= 1 else 4.0) and np.median(off[8:]) <= 1.0, (kind, radius)
         assert success(wrong, found) >= 0.98, (kind, radius)
 
