@@ -139,8 +139,8 @@ class GradientTracker:
     Parameters
     ----------
     frame : array (H, W) of uint8, uint16, float32 or float64
-        The first frame, at least 16 x 16 px. It may be masked (numpy.ma), as all frames. Brightness is taken on the scale 0 to 255: uint16 is divided by
-        257 (samples of 10 to 14 bits must be shifted up first), floats are taken for shares of white unless
+        The first frame, at least 16 x 16 px. It may be masked (numpy.ma), as all frames. Brightness is taken
+        on the scale 0 to 255: uint16 is divided by 257 (samples of 10 to 14 bits must be shifted up first), floats are taken for shares of white unless
         at least half of what is not dark (above 0.1) exceeds 1.5, in this frame or a later one.
     bbox : (x, y, width, height), px
         The target's box in it, with x = centre - width / 2; sides of at least 3 px and at most twice the
@@ -157,8 +157,8 @@ class GradientTracker:
     Raises
     ------
     ValueError
-        For a first frame that is too small, not two-dimensional or mostly not finite, a box that is too small or
-        wholly outside, and options out of range; each message names the argument.
+        For a first frame that is too small, not two-dimensional or mostly not finite, a box that is too small,
+        wholly outside or more than half masked, and options out of range; each message names the argument.
     TypeError
         For another dtype.
     """

@@ -136,8 +136,8 @@ struct Task<'a, 'b> {
 /// to if that explains more of it: nearly exact displacements have narrow minima.
 fn explained(flow: &Flow<'_>, noise: &Noise<'_>, options: &MotionOptions, found: MotionEstimate) -> MotionEstimate {
     let misfit = |found: &MotionEstimate| {
-        let squares = found.residuals.iter().filter(|rest| rest.is_finite()).map(|rest| rest * rest);
-        squares.sum::<f64>() / found.residuals.len().max(1) as f64
+        let known: Vec<f64> = found.residuals.iter().copied().filter(|rest| rest.is_finite()).collect();
+        known.iter().map(|rest| rest * rest).sum::<f64>() / known.len().max(1) as f64
     };
     let is_settled = matches!(noise, Noise::Unknown) || options.initial.is_some() || misfit(&found) < MISFIT;
     if is_settled || !keeps("motion3d.sampled_start") {

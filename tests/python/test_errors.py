@@ -306,3 +306,16 @@ def test_a_frame_of_another_dtype_is_the_frame_that_was_pushed():
     estimator.push(GOOD[0])
     with pytest.raises(TypeError, match="^frame: expected uint8 like the first frame, got uint16"):
         estimator.push(GOOD[1].astype(np.uint16))
+
+
+def test_parameters_of_a_scene_are_numbers():
+    with pytest.raises(TypeError, match="^u_x: expected a number, got <class 'str'>"):
+        scenes.Scene("affine", u_x="x")
+
+
+def test_covariances_that_are_not_symmetric_are_refused():
+    covariance = np.zeros((3, 4, 2, 2))
+    covariance[...] = np.eye(2)
+    covariance[1, 2, 0, 1] = 0.5
+    with pytest.raises(ValueError, match=r"^covariance: expected symmetric matrices, got an asymmetric one at pixel \(2, 1\)"):
+        jacoflow.FlowField.from_arrays(np.zeros((3, 4, 2)), covariance)

@@ -97,3 +97,21 @@ def test_forward_motion_is_found_in_narrow_fields_nearly_without_noise():
         wrong += found.status == "ok" and off > 4 * found.direction_std
         misfits += np.sqrt(np.mean(found.residuals**2)) > 5
     assert wrong == 0 and misfits <= 2
+
+
+def test_of_two_motions_with_half_the_points_each_the_larger_is_given_or_none():
+    """What is `ok` is the motion of most points."""
+    rng, ambiguous = np.random.default_rng(11), 0
+    for _ in range(20):
+        points = rng.uniform((-0.64, -0.48), (0.64, 0.48), (300, 2))
+        left, inv_depth, flow = points[:, 0] < 0, rng.uniform(1, 3, 300), np.zeros((300, 2))
+        motions = [(u / np.linalg.norm(u), 0.3 * w) for u, w in rng.normal(size=(2, 2, 3))]
+        for part, (u, w) in zip((left, ~left), motions, strict=True):
+            flow[part] = 0.02 * motion3d.predict_flow(points[part], u, w, inv_depth[part])
+        noise_std = 0.03 * np.median(np.linalg.norm(flow, axis=1))
+        found = motion3d.estimate_motion(points, flow + noise_std * rng.normal(size=(300, 2)), noise_std=noise_std, robust=True, placement="start")
+        ambiguous += found.status == "ambiguous"
+        if found.status == "ok":
+            u = motions[0 if left.mean() > 0.5 else 1][0]
+            assert np.degrees(np.arccos(np.clip(found.translation @ u, -1, 1))) < 4 * found.direction_std
+    assert ambiguous >= 12

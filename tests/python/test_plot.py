@@ -132,3 +132,16 @@ def test_missing_matplotlib_says_how_to_get_it(monkeypatch, turning):
         with pytest.raises(jacoflow.MissingDependencyError, match="matplotlib"):
             draw(turning)
     assert plot.flow_image(turning).shape == (20, 30, 3)
+
+
+def test_what_cannot_be_drawn_is_refused_by_name(pyplot, turning):
+    for options, error, message in (
+        ({"axes": "x"}, TypeError, "axes: expected an object like matplotlib.axes.Axes, got str"),
+        ({"frame": "x"}, ValueError, r"frame: expected a grey frame \(H, W\), got 'x'"),
+        ({"frame": np.zeros((4, 4, 3))}, ValueError, r"frame: expected a grey frame \(H, W\), got shape \(4, 4, 3\)"),
+        ({"colour": 5}, ValueError, "colour: expected a colour as matplotlib takes it, got 5"),
+    ):
+        with pytest.raises(error, match=f"^{message}"):
+            plot.quiver(turning, **options)
+    with pytest.raises(TypeError, match="^figure: expected an object like matplotlib.figure.Figure, got int"):
+        plot.overview(turning, figure=5)

@@ -1,6 +1,9 @@
 """Quantities of regions: one motion, means, and rates that are those of the motion and not of its chord."""
 
+import csv
 import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -256,3 +259,21 @@ def test_the_pixel_may_be_any_pair(fan_field, at):
 def test_what_is_no_pixel_is_named(fan_field, at):
     with pytest.raises((TypeError, ValueError), match="^at: expected"):
         fan_field.measure("rpm", at=at)
+
+
+def test_the_binary_measures_the_parameters_too(tmp_path):
+    frames = jacoflow.scenes.Scene("affine", width=96, height=64).frames(3)
+    jacoflow.io.write_frames(tmp_path / "frames.npy", frames)
+    names = ["u", "v", "u_x", "v_x", "u_y", "v_y", "divergence"]
+    place = ("--disc", "48,32,20", "--at", "50,30")
+    command = [sys.executable, "-m", "jacoflow", "measure", str(tmp_path / "frames.npy"), "--quantity", ",".join(names), *place]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    rows = list(csv.DictReader(done.stdout.splitlines()))
+    field = jacoflow.flow(*frames)
+    assert [row["quantity"] for row in rows] == names
+    for row in rows:
+        found = field.measure(row["quantity"], (48.0, 32.0, 20.0), at=(50, 30))
+        np.testing.assert_allclose([float(row["value"]), float(row["std"])], [found.value, found.std], rtol=1e-9)
+        assert (row["unit"], row["status"]) == (found.unit, "ok")
+    refused = subprocess.run([*command[:6], "foo"], capture_output=True, text=True, check=False)
+    assert refused.returncode == 2 and "quantity: expected u, v, u_x" in refused.stderr

@@ -25,7 +25,7 @@ impl Measured {
             Some(place) => Ok(Self::Parameter(place)),
             None => Quantity::parse(name).map(Self::Derived).map_err(|error| match error {
                 Error::Argument { argument, expected, got } => {
-                    Error::Argument { argument, expected: format!("{}, {expected}", MOTION_NAMES.join(", ")), got }
+                    Error::Argument { argument, expected: format!("{} or {expected}", MOTION_NAMES.join(", ")), got }
                 }
                 other => other,
             }),
