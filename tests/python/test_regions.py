@@ -224,6 +224,17 @@ def test_the_motion_around_a_pixel_is_that_at_the_pixel():
         assert found.status != "ok" or abs(found.value - truth) < 4 * found.std + 0.05, (at, found)
 
 
+def test_small_objects_are_not_slowed_by_what_lies_beside_them():
+    """Windows of slopes reach beyond a disc of 20 px; the flow across it does not."""
+    y, x = np.mgrid[:SIZE, :SIZE]
+    disc, wall = np.hypot(x - CENTRE[0], y - CENTRE[1]) < 20, turned(texture(5), 0.0)
+    frames = [np.clip(np.rint(np.where(disc, turned(PICTURE, k * 0.06), wall)), 0, 255).astype(np.uint8) for k in range(2)]
+    found = jacoflow.flow(*frames).measure("angular_velocity", (*CENTRE, 17.0))
+    assert found.status == "ok"
+    assert_allclose(found.value, 0.06, rtol=0.05)
+    assert abs(found.value - 0.06) < 2 * found.std
+
+
 def test_a_mean_of_what_affine_motion_does_not_have():
     scene = jacoflow.scenes.Scene("affine", width=80, height=60, u=0.5, v=0.2, random_state=1)
     field = jacoflow.flow(*scene.frames(3), method=jacoflow.Instantaneous(model="accelerating", neighbourhood=(9, 9)))

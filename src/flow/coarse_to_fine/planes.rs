@@ -99,6 +99,7 @@ impl<T: SimdReal> Planes<T> {
         &mut self.data[..len]
     }
 
+    #[inline]
     pub fn line(&self, k: usize, y: usize) -> &[T] {
         let first = k * self.stride() + LEFT;
         &self.row(y)[first..first + self.width]
@@ -109,6 +110,7 @@ impl<T: SimdReal> Planes<T> {
         &mut self.row_mut(y)[first..first + width]
     }
 
+    #[inline]
     pub fn at(&self, k: usize, x: usize, y: usize) -> T {
         self.line(k, y)[x]
     }

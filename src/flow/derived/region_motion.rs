@@ -61,7 +61,8 @@ impl RegionMotion {
 /// Fits one affine motion `m0` about the centre (or `at`) to the estimates `m_i` (covariance `C_i`) of the
 /// valid sites in `region` (`None`: all) that follow the motion of most of them, or with `at`, a pixel
 /// `(x, y)`, that of the sites around it: `min sum (m_i - T_i m0)^T C_i^-1 (m_i - T_i m0)`, where `T_i`
-/// carries the affine motion from the centre to the site.
+/// carries the affine motion from the centre to the site. The motion is the fit to `(u, v)` of the sites; the
+/// covariance is that of the fit to all six parameters, and what this would change.
 ///
 /// Estimates of neighbouring sites share pixels; the covariance is enlarged by [`sharing`](super::sharing()).
 /// Where the estimates scatter more than their covariances allow, it is enlarged by that ratio too (R. T.
@@ -133,30 +134,38 @@ pub fn fit_region<T: Real>(
     if !is_found {
         return Ok(RegionMotion { count, status: RegionStatus::NoDominantMotion, ..unknown });
     }
-    let Some((motion, mut covariance)) = least_squares(field, &followers, centre) else { return Ok(unknown) };
+    let observed = observed_parameters(field);
+    let fit = |parameters: &[usize]| least_squares(field, &followers, centre, parameters);
+    // Jacobians see what lies beside a small object, too: the motion is that of the flow alone, and what they
+    // would change is part of the covariance.
+    let (Some((motion, _)), Some((joint, mut covariance))) = (fit(&observed[..2]), fit(&observed)) else {
+        return Ok(unknown);
+    };
     let near: Vec<usize> = sites.iter().filter(|site| dominant.may_hold(site)).map(|site| site.index).collect();
-    let common = common_residual(field, &near, (centre, &motion), &floors(field));
-    for (row, more) in covariance.iter_mut().zip(common) {
-        row.iter_mut().zip(more).for_each(|(value, more)| *value += more);
+    let common = common_residual(field, &near, (centre, &joint), &floors(field));
+    for i in 0..6 {
+        for j in 0..6 {
+            covariance[i][j] += common[i][j] + (joint[i] - motion[i]) * (joint[j] - motion[j]);
+        }
     }
     Ok(RegionMotion { motion, covariance, count, status: RegionStatus::Ok, ..unknown })
 }
 
-/// The weighted fit to the sites `used`, with its covariance.
+/// The weighted fit to the parameters `observed` of the sites `used`, with its covariance.
 fn least_squares<T: Real>(
     field: &FlowField<T>,
     used: &[usize],
     centre: (f64, f64),
+    observed: &[usize],
 ) -> Option<([f64; 6], [[f64; 6]; 6])> {
     let (dx, dy) = field.layout.units.pixel_pitch;
-    let observed: Vec<usize> = observed_parameters(field);
     let floor = floors(field);
     let (mut normal, mut right, mut square, mut count) = (Matrix6::zeros(), Vector6::zeros(), 0.0, 0);
     // Sums of the weights, and of what they make of an error that all sites have in common.
     let mut weights = DMatrix::zeros(observed.len(), observed.len());
     let mut passed = DMatrix::zeros(6, observed.len());
     for &site in used {
-        let Some(weight) = inverse_covariance(field, site, &observed, &floor) else { continue };
+        let Some(weight) = inverse_covariance(field, site, observed, &floor) else { continue };
         let (x, y) = field.layout.sites.pixel(site % field.width, site / field.width);
         let carry = carry_to((x as f64 - centre.0) * dx, (y as f64 - centre.1) * dy);
         let rows = carry.select_rows(observed.iter());
