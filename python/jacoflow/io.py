@@ -94,8 +94,8 @@ def frames(
 def write_frames(path: _Path, frames: Iterable[NDArray[Any]], *, frame_rate: float = 25.0) -> int:
     """Writes frames (H, W), or (H, W, 3) in colour, of one size and dtype, in their levels; returns how many.
 
-    `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16); those
-    that an earlier call wrote there are removed.
+    `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16), which
+    appear together, at the end, and replace those of an earlier call.
     `frame_rate` in frames/s is noted where the format has room for it.
     """
     return _write_frames(path, frames, frame_rate)

@@ -5,6 +5,7 @@ use super::manifold::Manifold;
 use super::state::{GaussianState, roots};
 use crate::error::{Error, Result};
 use crate::math::dense::{add_gram, covariance_root, multiply, multiply_transposed, solve, symmetrise};
+use crate::parallel::checkpoint;
 
 /// Smoothed means and covariances of `T` times; NaN where a state could not be smoothed.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,6 +60,7 @@ pub(super) fn smooth<M: Manifold>(
     let (mut noise, mut rest, mut weighted) = (vec![0.0; square], vec![0.0; square], vec![0.0; square]);
     let mut factor = vec![0.0; square];
     for k in (0..times - 1).rev() {
+        checkpoint();
         let x = &Xs[k * means..(k + 1) * means];
         let mut P = Ps[k * size..(k + 1) * size].to_vec();
         let (roots, _) = roots(&mut P, n)?;

@@ -1,5 +1,6 @@
 """Arguments and files that no caller means: errors that name them, and no abort."""
 
+import os
 import pathlib
 import subprocess
 import sys
@@ -165,6 +166,32 @@ def test_states_that_no_filter_leaves_are_refused(array, value, tmp_path):
     with pytest.raises(jacoflow.FormatError, match="array 'root' holds -1e0, expected numbers from 0"):
         filter_.load(path)
     assert filter_.push(FRAMES[1]).valid.any()
+
+
+def test_a_run_that_fails_leaves_the_earlier_one(tmp_path):
+    io.write_frames(tmp_path, FRAMES)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def broken():
+        yield FRAMES[1]
+        raise RuntimeError("the camera stopped")
+
+    with pytest.raises(RuntimeError, match="the camera stopped"):
+        io.write_frames(tmp_path, broken())
+    with pytest.raises(TypeError):
+        io.write_frames(tmp_path, [frame / 255 for frame in FRAMES])
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    # A run may take the place of what it is made of.
+    assert io.write_frames(tmp_path, (frame // 2 for frame in io.frames(tmp_path))) == len(FRAMES)
+    np.testing.assert_array_equal(next(io.frames(tmp_path)), FRAMES[0] // 2)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_a_pipe_is_no_hdf5_file(tmp_path):
+    pytest.importorskip("h5py")
+    os.mkfifo(tmp_path / "pipe.h5")
+    with pytest.raises(jacoflow.FormatError, match="pipe.h5: expected a file"):
+        io.frames(tmp_path / "pipe.h5")
 
 
 def test_a_shorter_run_leaves_nothing_of_a_longer_one(tmp_path):

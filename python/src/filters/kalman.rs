@@ -5,6 +5,7 @@ use super::gaussian::{GaussianFilter, sizes};
 use super::sequence::{Record, filtered, for_each_time, items, noises, smoothed};
 use crate::arrays;
 use crate::errors::Outcome;
+use crate::interrupt::interruptible;
 use crate::options::Integer;
 use jacoflow::error::Error;
 use jacoflow::filter::KalmanFilter as Core;
@@ -195,7 +196,7 @@ impl KalmanFilter {
         base.give(py, &mut core.state, None, None)?;
         let (callbacks, work) = (Callbacks::default(), &*core);
         let mut manifold = base.manifold(py, &callbacks);
-        let result = py.detach(|| work.rts_smoother(&mut manifold, (&Xs, &Ps), Some(&Fs), Qs.as_deref()));
+        let result = interruptible(py, || Ok(work.rts_smoother(&mut manifold, (&Xs, &Ps), Some(&Fs), Qs.as_deref())))?;
         drop(manifold);
         let [x, P, K, Pp] = smoothed(py, base, times, callbacks.finish(result)?)?;
         Ok((x, P, K, Pp))
