@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
+import os
 import weakref
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -15,6 +16,9 @@ from ._jacoflow import FormatError, MissingDependencyError, luminance
 from ._request import Request
 
 Frame = NDArray[Any]
+
+_COLOUR_MODELS = ("MINISWHITE", "MINISBLACK", "RGB", "PALETTE", "YCBCR", "CFA")
+"""PhotometricInterpretation of TIFF whose values are grey, or come as RGB."""
 
 
 class Stack:
@@ -43,6 +47,8 @@ def _presented(frame: Frame, request: Request) -> Frame:
     """A frame by the rule for colour."""
     if frame.ndim == 3 and frame.shape[2] == 1:
         frame = frame[..., 0]
+    if frame.ndim == 3 and frame.shape[2] not in (3, 4):
+        raise FormatError(f"{request.source}: holds {frame.shape[2]} values a pixel; expected grey (1) or colour (3 or 4)")
     if request.colour == "rgb":
         if frame.ndim == 3:
             return np.ascontiguousarray(frame[..., :3])
@@ -151,6 +157,8 @@ def _old_matlab(request: Request) -> Frame:
 def _hdf5_sets(request: Request) -> dict[str, Any]:
     """The data sets of numbers in a file by name; they keep it open."""
     h5py = _package(request, "h5py", "HDF5 (also MATLAB 7.3)")
+    if os.path.exists(request.source) and not os.path.isfile(request.source):
+        raise FormatError(f"{request.source}: expected a file, as HDF5 is not read in order")
     try:
         file = h5py.File(request.source, "r")
     except FileNotFoundError:
@@ -174,9 +182,10 @@ def open_tifffile(request: Request) -> Stack | None:
         tifffile: Any = importlib.import_module("tifffile")
     except ImportError:
         return None
-    file = tifffile.TiffFile(request.source)
+    file = _readable(request, lambda: tifffile.TiffFile(request.source))
     try:
-        stack = Stack(request, *_series_frames(request, file.series[0]))
+        series = _readable(request, lambda: file.series[0])
+        stack = Stack(request, *_series_frames(request, series))
     except BaseException:
         file.close()
         raise
@@ -184,8 +193,20 @@ def open_tifffile(request: Request) -> Stack | None:
     return stack
 
 
+def _readable(request: Request, read: Callable[[], Any]) -> Any:
+    """What tifffile reads, or `FormatError`: of damaged files it raises errors of many types."""
+    try:
+        return read()
+    except (FileNotFoundError, MemoryError):
+        raise
+    except Exception as error:
+        raise FormatError(f"{request.source}: no TIFF file that can be read ({error})") from error
+
+
 def _series_frames(request: Request, series: Any) -> tuple[int, Callable[[int], Frame]]:
     """Number of frames of a series of tifffile, of the channel and slice of the request, and the frames."""
+    if (model := getattr(series.keyframe.photometric, "name", "none")) not in _COLOUR_MODELS:
+        raise FormatError(f"{request.source}: holds colours of the model {model}; expected grey or RGB")
     own = len(series.keyframe.shape)
     outer = list(zip(series.axes[:-own], series.shape[:-own], strict=True))
     places: NDArray[Any] = np.arange(len(series.pages)).reshape([length for _, length in outer])
@@ -206,7 +227,7 @@ def _series_frames(request: Request, series: Any) -> tuple[int, Callable[[int], 
     is_planar = series.axes[-own:].startswith("S")
 
     def get(k: int) -> Frame:
-        image: Frame = series.pages[int(pages[k])].asarray()
+        image: Frame = _readable(request, lambda: series.pages[int(pages[k])].asarray())
         return np.moveaxis(image, 0, -1) if is_planar else image
 
     return len(pages), get

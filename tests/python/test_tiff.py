@@ -293,3 +293,16 @@ def test_estimate_takes_the_units_that_the_file_notes(tmp_path):
     assert (other.frame_period, other.pixel_pitch, other.length_unit) == (1.0, (2.0, 3.0), "mm")
     half = jacoflow.estimate(io.frames(path, step=2), method="windowed")
     assert half.frame_period == 0.5
+
+
+def test_values_that_are_neither_grey_nor_rgb_are_refused(tmp_path):
+    inks, pairs, damaged = (tmp_path / name for name in ("inks.tif", "pairs.tif", "damaged.tif"))
+    tifffile.imwrite(inks, np.zeros((24, 32, 4), np.uint8), photometric="separated")
+    tifffile.imwrite(pairs, np.zeros((24, 32, 2), np.uint8), photometric="minisblack", planarconfig="contig")
+    tifffile.imwrite(damaged, np.zeros((24, 32), np.uint8))
+    with tifffile.TiffFile(damaged, mode="r+") as file:
+        file.pages[0].tags["Compression"].overwrite(9999)
+    for path, words in ((inks, "holds colours of the model SEPARATED"), (pairs, "holds 2 values a pixel"), (damaged, "no TIFF file that can be read")):
+        for colour in (None, "rgb", "luminance"):
+            with pytest.raises(jacoflow.FormatError, match=f"{path.name}: {words}"):
+                list(io.frames(path, colour=colour))
