@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ._checks import numbers, positive_integer, positive_number, real_number
+from ._checks import numbers, positive_integer, positive_number
 from ._figures import axes_or_new, check_parts, colour_map, expect_colour, frame_extent, pyplot_or_error
 from ._jacoflow import FlowField
 from ._stereo_plot import clusters, disparity, track_graph
@@ -102,19 +102,22 @@ def quiver(
     scale: float | None = None,
     colour: str = "#ffb000",
 ) -> Axes:
-    """Draws arrows of a flow (H, W, 2), or of points (N, 2), over `frame`, a grey array (H, W), if given.
+    """Draws arrows of a flow (H, W, 2), or of points (N, 2), over `frame`, a grey array (H, W) of the size of
+    the field's frames, if given.
 
     One arrow every `step` sites (default: about 24 along the longer side); an arrow is `scale` times the flow
     long (default: the longest arrows just fit their distance). Px throughout.
     """
-    flow = _part(field, "flow")
+    flow = _part(field, "flow") * _pixels(field)
     axes = axes_or_new(axes)
     expect_colour("colour", colour)
     if flow.ndim not in (2, 3) or flow.shape[-1] != 2:
         raise ValueError(f"field: expected flow of shape (H, W, 2) or (N, 2), got {flow.shape}; index a stack first")
     x, y = _positions(field, flow.shape[:-1])
     if frame is not None:
-        axes.imshow(numbers("frame", frame, "a grey frame (H, W)", (None, None)), cmap="gray", interpolation="nearest")
+        size = getattr(field, "frame_size", None)
+        expected, shape = ("a grey frame (H, W)", (None, None)) if size is None else (f"the field's frame, shape {size[::-1]}", size[::-1])
+        axes.imshow(numbers("frame", frame, expected, shape), cmap="gray", interpolation="nearest")
     if flow.ndim == 3:
         step = max(1, round(max(flow.shape[:2]) / 24)) if step is None else step
         step = positive_integer("step", step)
@@ -123,7 +126,7 @@ def quiver(
     known = np.isfinite(flow).all(axis=-1)
     x, y, flow = x[known], y[known], flow[known]
     if scale is not None:
-        scale = real_number("scale", scale)
+        scale = positive_number("scale", scale)
     else:
         longest = np.percentile(np.hypot(flow[:, 0], flow[:, 1]), 98) if len(flow) else 0.0
         distance = _spacing(x, y)
@@ -205,6 +208,13 @@ def overview(field: FieldLike, *, frame: NDArray[Any] | None = None, figure: Fig
 def _unit(field: FieldLike, name: str, default: str) -> str:
     """The unit of a parameter or quantity, where the field knows it."""
     return field.unit(name) if isinstance(field, FlowField) else default
+
+
+def _pixels(field: FieldLike) -> NDArray[np.float64]:
+    """What makes px/frame of the flow's (u, v), array (2,)."""
+    period = getattr(field, "frame_period", None)
+    pixels: NDArray[np.float64] = (1.0 if period is None else period) / np.array(getattr(field, "pixel_pitch", (1.0, 1.0)), dtype=float)
+    return pixels
 
 
 def _part(field: FieldLike, name: str) -> NDArray[np.float64]:

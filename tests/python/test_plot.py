@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
 import jacoflow
 from jacoflow import plot
@@ -139,9 +140,20 @@ def test_what_cannot_be_drawn_is_refused_by_name(pyplot, turning):
         ({"axes": "x"}, TypeError, "axes: expected an object like matplotlib.axes.Axes, got str"),
         ({"frame": "x"}, ValueError, r"frame: expected a grey frame \(H, W\), got 'x'"),
         ({"frame": np.zeros((4, 4, 3))}, ValueError, r"frame: expected a grey frame \(H, W\), got shape \(4, 4, 3\)"),
+        ({"scale": np.nan}, ValueError, "scale: expected a number above 0, got nan"),
         ({"colour": 5}, ValueError, "colour: expected a colour as matplotlib takes it, got 5"),
     ):
         with pytest.raises(error, match=f"^{message}"):
             plot.quiver(turning, **options)
     with pytest.raises(TypeError, match="^figure: expected an object like matplotlib.figure.Figure, got int"):
         plot.overview(turning, figure=5)
+    field = jacoflow.FlowField.from_arrays(np.zeros((20, 30, 2)))
+    with pytest.raises(ValueError, match=r"^frame: expected the field's frame, shape \(20, 30\), got shape \(30, 20\)"):
+        plot.quiver(field, frame=np.zeros((30, 20)))
+
+
+def test_arrows_are_in_pixels_whatever_the_field_is_measured_in(pyplot):
+    frames = jacoflow.scenes.Scene("affine", width=64, height=64, u=1.0, v=1.0).frames(2)
+    field = jacoflow.flow(*frames, method="windowed", pixel_pitch=(1.0, 4.0), length_unit="mm", fps=50)
+    arrows = plot.quiver(field, step=10, scale=1.0).collections[0]
+    assert_allclose([np.median(arrows.U), np.median(arrows.V)], 1.0, atol=0.1)
