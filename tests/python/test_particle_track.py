@@ -11,6 +11,7 @@ import sys
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.ndimage import gaussian_filter
 
 from jacoflow import _jacoflow, scenes
 from jacoflow.track import ParticleStep, ParticleTracker, ParticleTracks, track_particles
@@ -307,6 +308,25 @@ def test_a_cut_lets_all_targets_coast(apart):
     step = tracker.update(other)
     assert step.status == ("coasting", "coasting") and step.reason == ("the scene was cut",) * 2
     assert (step.n_tracks == 0).all() and (step.tracks.owner == -1).all()
+
+
+def test_corners_that_survive_a_cut_are_not_taken_for_the_background():
+    """The target alone stays in view while the scenery changes with every frame."""
+    rng = np.random.default_rng(0)
+    textures = gaussian_filter(rng.normal(size=(12, 120, 160, 3)), (0, 1.5, 1.5, 0))
+    textures = np.clip(128 + 300 * textures, 0, 255).astype(np.uint8)
+
+    def frame(t):
+        image = textures[max(t - 5, 0)].copy()
+        image[40:70, 20 + 2 * t : 50 + 2 * t] = textures[11, :30, :30]
+        return image
+
+    tracker = ParticleTracker(frame(0), [[20, 40, 30, 30]], **FEW)
+    steps = [tracker.update(frame(t)) for t in range(1, 16)]
+    assert [step.reason[0] for step in steps[5:]] == ["the scene was cut"] * 10
+    assert all(np.array_equal(step.camera, np.eye(2, 3)) for step in steps[5:])
+    # Nobody measures it: at 2 px a frame, it is where the velocity of the frames before takes it.
+    assert_allclose(steps[-1].boxes[0, 0], 50, atol=5)
 
 
 def test_a_known_camera_counts_through_frames_that_show_nothing(apart):

@@ -241,7 +241,8 @@ impl ParticleTracker {
         let known = missed.chain([known]).reduce(|first, next| Some(first?.then(&next?))).flatten();
         let pyramid = Corners::pyramid(view.grey.clone());
         let was_cut = self.corners.follow(&self.pyramid, &pyramid)? && crate::ablation::keeps("particle.cut");
-        let camera = self.measure_background(known)?;
+        // The corners that a cut leaves are chance, or the targets' own: they say nothing of the camera.
+        let camera = self.measure_background(known.or(was_cut.then_some(CameraMotion::NONE)))?;
         let map = self.foreground_map(&view)?;
         self.frame += 1;
         if was_cut {
