@@ -96,6 +96,10 @@ def test_degenerate_scenes_have_their_status():
     few = motion3d.estimate_motion(make.points[:4], make.flow[:4])
     assert few.status == "too_few_points" and np.isnan(few.translation).all() and few.inv_depth.shape == (4,)
     assert motion3d.estimate_motion(np.empty((0, 2)), np.empty((0, 2))).status == "too_few_points"
+    # Five points fit a motion exactly; nothing is left to estimate their noise from.
+    exact = motion3d.estimate_motion(make.points[:5], make.flow[:5])
+    assert exact.status == "few_points" and np.isnan(exact.direction_std)
+    assert np.isnan(exact.inv_depth_std).all() and np.isnan(exact.time_to_contact_std).all()
     rng = np.random.default_rng(0)
     _, r = scenes.rows(make.points)
     turning = motion3d.estimate_motion(make.points, r @ W + rng.normal(0, 0.01, (300, 2)), noise_std=0.01, placement="start")

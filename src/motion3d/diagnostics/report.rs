@@ -42,9 +42,11 @@ pub(crate) fn report(
     for (k, &source) in inliers.source.iter().enumerate() {
         place[source as usize] = Some(k);
     }
+    // Depths along a motion of unknown covariance are as uncertain.
+    let known = if solution.covariance.is_some() { 1.0 } else { f64::NAN };
     // The likeliest depth is smoothed where possible, with its variance.
     let rated = |k: usize| {
-        let own = (half_way.depth(seen.nu[k]), half_way.slope(seen.nu[k]).powi(2) / seen.s2[k]);
+        let own = (half_way.depth(seen.nu[k]), known * half_way.slope(seen.nu[k]).powi(2) / seen.s2[k]);
         let inlier = place[all.source[k] as usize];
         let smooth = inlier.map(|place| solution.smooth.as_ref().map_or(own.0, |nu| half_way.depth(nu[place])));
         let likeliest = match (inlier, &solution.smooth, &solution.variance) {
