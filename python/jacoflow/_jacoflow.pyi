@@ -400,11 +400,12 @@ class FlowField:
         work on it: (u, v) of shape (H, W, 2), their Jacobian (H, W, 2, 2), [[u_x, u_y], [v_x, v_y]], and the
         covariance of (u, v), (H, W, 2, 2), or with a Jacobian of (u, v, u_x, v_x, u_y, v_y), (H, W, 6, 6).
 
-        NaN where the flow is unknown. Without a Jacobian derivatives read as zero, and quantities of them
-        (`divergence`, ...) are refused. `interval` is the time over which the flow is taken: "forward"
-        (default), from the field's frame to the next, "central", half the displacement from the frame before
-        to the one after, or "instant", the velocity. ValueError for other shapes or names, negative
-        variances, and covariances that are not symmetric or have a negative eigenvalue.
+        NaN, or masked, where the flow is unknown. Without a Jacobian derivatives read as zero, and
+        quantities of them (`divergence`, ...) are refused. `interval` is the time over which the flow is
+        taken: "forward" (default), from the field's frame to the next, "central", half the displacement from
+        the frame before to the one after, or "instant", the velocity. ValueError for other shapes or names,
+        and for covariances that are not symmetric, have a negative eigenvalue, or are unknown where the flow
+        is known.
         """
     @staticmethod
     def load(path: _Path) -> FlowField:

@@ -14,13 +14,22 @@ use pyo3::prelude::*;
 /// Sample types that frames may have, for messages.
 const ACCEPTED: &str = "an array of bool, integers of 8 to 64 bits, float16, float32 or float64";
 
+/// A masked array as doubles, NaN where it is masked; other objects as they are.
+pub fn filled_with_nan<'py>(object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyAny>> {
+    if !is_masked(object)? {
+        return Ok(object.clone());
+    }
+    Ok(object.call_method1("astype", ("float64",))?.call_method1("filled", (f64::NAN,))?)
+}
+
 /// `object` as a numpy array: itself, or what `numpy.asarray` makes of it. Misaligned memory and that of
 /// another byte order is copied.
 pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
     if is_masked(object)? {
         return Err(PyTypeError::new_err(format!(
-            "{argument}: expected a plain array, got a masked one; pass its `data`, and the option mask=~frame.mask where there is one"
-        )).into());
+            "{argument}: expected a plain array, got a masked one; fill it first: `array.filled(value)`"
+        ))
+        .into());
     }
     native(object)
 }
@@ -156,7 +165,7 @@ fn converted(argument: &str, array: Bound<'_, PyUntypedArray>, colour: ColourRul
         }
         [_, _, 3 | 4] => Err(PyValueError::new_err(format!(
             "{argument}: expected a grey frame (H, W), got a colour frame {}; \
-             convert it with jacoflow.luminance(frame), or pass colour=\"luminance\" where there is that option",
+             convert it with jacoflow.luminance(frame), or pass preprocess=Preprocess(colour=\"luminance\") where there is that option",
             shape_text(&shape)
         ))
         .into()),

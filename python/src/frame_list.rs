@@ -85,11 +85,11 @@ impl<'py> Frames<'py> {
         };
         match shape[..] {
             [_, rows, 3 | 4] if rows > 4 => refuse(
-                ", which looks like one colour image; pass a list of frames, or a stack (T, H, W, 3) with colour=\"luminance\"",
+                ", which looks like one colour image; pass a list of frames, or a stack (T, H, W, 3) with preprocess=Preprocess(colour=\"luminance\")",
             ),
             [count, _, _] => Ok(Self::of(array.into_any(), count, colour)),
             [count, _, _, 3 | 4] if colour == ColourRule::Luminance => Ok(Self::of(array.into_any(), count, colour)),
-            [_, _, _, 3 | 4] => refuse("; for colour frames pass colour=\"luminance\""),
+            [_, _, _, 3 | 4] => refuse("; for colour frames pass preprocess=Preprocess(colour=\"luminance\")"),
             _ => refuse(""),
         }
     }

@@ -93,8 +93,9 @@ impl<T: Real> FlowField<T> {
     /// where a plane is not finite.
     ///
     /// # Errors
-    /// [`Error::Argument`] naming `motion` or `covariance` for another number of values, a negative variance,
-    /// or correlations with a negative eigenvalue.
+    /// [`Error::Argument`] naming `motion` or `covariance` for another number of values; the latter also
+    /// where values of a known flow are not finite, a variance is negative, or correlations have a negative
+    /// eigenvalue.
     pub fn from_planes(size: (usize, usize), motion: Vec<T>, covariance: Option<Vec<T>>) -> Result<Self> {
         let (n, count) = (size.0 * size.1, motion.len());
         let (model, p) = if count == 2 * n { ("translational", 2) } else { ("affine", MOTION_NAMES.len()) };
@@ -111,24 +112,30 @@ impl<T: Real> FlowField<T> {
             frame_index: 0,
             correlation_length: 0.0,
         };
+        let is_known = |site: usize| (0..p).all(|k| motion[k * n + site].finite());
         if let Some(planes) = &covariance {
-            let (entries, found) = (p * (p + 1) / 2 * n, planes.len());
+            let (entries, found) = (p * (p + 1) / 2, planes.len());
+            if found != entries * n {
+                let expected = format!("{entries} planes of {n} values");
+                return Err(Error::argument("covariance", expected, format!("{found} values")));
+            }
+            let values = |site: usize| (0..entries).map(move |k| planes[k * n + site].to_f64());
             // Row k of the upper triangle begins with a variance.
-            let is_negative = |k: usize| {
-                let plane = k * p - k * k.saturating_sub(1) / 2;
-                planes[plane * n..(plane + 1) * n].iter().any(|v| v.to_f64() < 0.0)
-            };
-            if found != entries || (0..p).any(is_negative) {
-                let expected = format!("{entries} values, variances of at least 0");
-                let got = if found == entries { "a negative variance".into() } else { format!("{found} values") };
+            let variances = |site: usize| (0..p).map(move |k| planes[(k * p - k * k.saturating_sub(1) / 2) * n + site]);
+            for site in 0..n {
+                let (expected, got) = if is_known(site) && !values(site).all(f64::is_finite) {
+                    ("finite values where the flow is known", "another")
+                } else if variances(site).any(|v| v.to_f64() < 0.0) {
+                    ("variances of at least 0", "a negative one")
+                } else if is_indefinite(planes, (site, n), p) {
+                    ("positive semi-definite matrices", "an indefinite one")
+                } else {
+                    continue;
+                };
+                let got = format!("{got} at pixel ({}, {})", site % size.0, site / size.0);
                 return Err(Error::argument("covariance", expected, got));
             }
-            if let Some(site) = (0..n).find(|&site| is_indefinite(planes, (site, n), p)) {
-                let got = format!("an indefinite matrix at pixel ({}, {})", site % size.0, site / size.0);
-                return Err(Error::argument("covariance", "positive semi-definite matrices", got));
-            }
         }
-        let is_known = |site: usize| (0..p).all(|k| motion[k * n + site].finite());
         let status = |site| if is_known(site) { Status::Ok } else { Status::Unobservable };
         let status = (0..n).map(status).collect();
         Ok(Self { motion, covariance, status, ..Self::empty(layout, false)? })

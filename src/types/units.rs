@@ -34,12 +34,16 @@ impl Units {
     }
 
     /// # Errors
-    /// [`Error::Argument`] naming `pixel_pitch` or `frame_period` unless they are positive and finite.
+    /// [`Error::Argument`] naming `pixel_pitch` or `frame_period` unless they are positive and finite, and
+    /// `length_unit` if it is blank.
     pub fn check(&self) -> Result<()> {
         let positive = |value: f64| value.is_finite() && value > 0.0;
         let (dx, dy) = self.pixel_pitch;
         if !(positive(dx) && positive(dy)) {
             return Err(Error::argument("pixel_pitch", "two positive, finite lengths", format!("({dx}, {dy})")));
+        }
+        if self.length.trim().is_empty() {
+            return Err(Error::argument("length_unit", "the name of a unit, such as mm", format!("{:?}", self.length)));
         }
         match self.frame_period {
             Some(period) if !positive(period) => {

@@ -319,3 +319,8 @@ def test_covariances_that_are_not_symmetric_are_refused():
     covariance[1, 2, 0, 1] = 0.5
     with pytest.raises(ValueError, match=r"^covariance: expected symmetric matrices, got an asymmetric one at pixel \(2, 1\)"):
         jacoflow.FlowField.from_arrays(np.zeros((3, 4, 2)), covariance)
+
+
+def test_a_unit_has_a_name():
+    with pytest.raises(ValueError, match='^length_unit: expected the name of a unit, such as mm, got " "'):
+        FlowEstimator(pixel_pitch=0.1, length_unit=" ")

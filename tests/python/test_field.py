@@ -266,3 +266,5 @@ def test_indexing_a_stack():
     assert [field.frame_index for field in stack] == [1, 2, 3]
     with pytest.raises(IndexError, match="index 3"):
         stack[3]
+    with pytest.raises(TypeError, match="^index: expected an integer or a slice, got list"):
+        stack[[0, 2]]

@@ -154,12 +154,29 @@ def test_arrays_that_do_not_fit_are_refused_by_name():
         make(flow, jacobian=jacobian[:-1])
     with pytest.raises(ValueError, match=r"covariance: expected shape \(60, 80, 6, 6\)"):
         make(flow, np.zeros((60, 80, 2, 2)), jacobian)
-    with pytest.raises(ValueError, match="covariance: .*negative variance"):
-        make(flow, np.broadcast_to(-np.eye(2), (60, 80, 2, 2)))
-    with pytest.raises(ValueError, match=r"covariance: .*indefinite matrix at pixel \(0, 0\)"):
-        make(flow, np.broadcast_to([[1e-4, 2e-4], [2e-4, 1e-4]], (60, 80, 2, 2)))
+    bad = [
+        (-np.eye(2), "variances of at least 0, got a negative one"),
+        (np.array([[1e-4, 2e-4], [2e-4, 1e-4]]), "positive semi-definite matrices, got an indefinite one"),
+        (np.diag([1e-4, np.nan]), "finite values where the flow is known, got another"),
+    ]
+    for matrix, words in bad:
+        covariance = np.tile(1e-4 * np.eye(2), (60, 80, 1, 1))
+        covariance[3, 4] = matrix
+        with pytest.raises(ValueError, match=rf"^covariance: expected {words} at pixel \(4, 3\)"):
+            make(flow, covariance)
     with pytest.raises(ValueError, match="interval: expected one of forward, central, instant"):
         make(flow, interval="backward")
+
+
+def test_what_is_masked_is_unknown():
+    flow = np.ma.masked_greater(np.arange(24.0).reshape(3, 4, 2), 20)
+    covariance = np.ma.masked_array(np.tile(np.eye(2), (3, 4, 1, 1)))
+    covariance[2, 2:] = np.ma.masked
+    field = jacoflow.FlowField.from_arrays(flow, covariance)
+    assert list(np.flatnonzero(~field.valid)) == [10, 11]
+    assert np.all(field.std("u")[field.valid] == 1)
+    with pytest.raises(ValueError, match=r"^covariance: expected finite values where the flow is known, got another at pixel \(2, 2\)"):
+        jacoflow.FlowField.from_arrays(flow.data, covariance)
 
 
 def test_arrays_say_over_which_time_the_flow_is_taken():

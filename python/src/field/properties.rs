@@ -134,11 +134,12 @@ impl FlowField {
     /// work on it: (u, v) of shape (H, W, 2), their Jacobian (H, W, 2, 2), [[u_x, u_y], [v_x, v_y]], and the
     /// covariance of (u, v), (H, W, 2, 2), or with a Jacobian of (u, v, u_x, v_x, u_y, v_y), (H, W, 6, 6).
     ///
-    /// NaN where the flow is unknown. Without a Jacobian derivatives read as zero, and quantities of them
-    /// (`divergence`, ...) are refused. `interval` is the time over which the flow is taken: "forward"
-    /// (default), from the field's frame to the next, "central", half the displacement from the frame before
-    /// to the one after, or "instant", the velocity. ValueError for other shapes or names, negative
-    /// variances, and covariances that are not symmetric or have a negative eigenvalue.
+    /// NaN, or masked, where the flow is unknown. Without a Jacobian derivatives read as zero, and
+    /// quantities of them (`divergence`, ...) are refused. `interval` is the time over which the flow is
+    /// taken: "forward" (default), from the field's frame to the next, "central", half the displacement from
+    /// the frame before to the one after, or "instant", the velocity. ValueError for other shapes or names,
+    /// and for covariances that are not symmetric, have a negative eigenvalue, or are unknown where the flow
+    /// is known.
     #[staticmethod]
     #[pyo3(signature = (flow, covariance = None, jacobian = None, *, interval = None))]
     fn from_arrays(
@@ -186,7 +187,11 @@ impl FlowField {
             let (first, length) = (range.start as usize, range.slicelength);
             return Ok(Self { store: self.store.clone(), start: self.start + first, count: length, stack: true });
         }
-        let index: isize = index.extract()?;
+        let wrong = |error: PyErr| {
+            let said = || format!("index: expected an integer or a slice, got {}", arrays::kind_of(index));
+            if error.is_instance_of::<PyTypeError>(index.py()) { PyTypeError::new_err(said()) } else { error }
+        };
+        let index: isize = index.extract().map_err(wrong)?;
         let place = if index < 0 { index + count as isize } else { index };
         if place < 0 || place >= count as isize {
             return Err(PyIndexError::new_err(format!("index {index}: the stack has {count} fields")).into());

@@ -133,7 +133,7 @@ pub fn from_arrays(
     jacobian: Option<&Bound<'_, PyAny>>,
     interval: Option<&str>,
 ) -> Outcome<FlowField> {
-    let (shape, values) = arrays::doubles("flow", flow)?;
+    let (shape, values) = arrays::doubles("flow", &arrays::filled_with_nan(flow)?)?;
     let [height, width, 2] = shape[..] else {
         return Err(Error::argument("flow", "shape (H, W, 2)", format!("shape {}", shape_text(&shape))).into());
     };
@@ -142,7 +142,7 @@ pub fn from_arrays(
         places.iter().flat_map(|&at| values.iter().skip(at).step_by(tail).copied()).collect()
     };
     let matrices = |name: &'static str, object: &Bound<'_, PyAny>, side: usize, places: &[usize]| {
-        let (shape, values) = arrays::doubles(name, object)?;
+        let (shape, values) = arrays::doubles(name, &arrays::filled_with_nan(object)?)?;
         if shape != [height, width, side, side] {
             let expected = format!("shape ({height}, {width}, {side}, {side})");
             return Err(Raised::from(Error::argument(name, expected, format!("shape {}", shape_text(&shape)))));
