@@ -324,3 +324,10 @@ def test_covariances_that_are_not_symmetric_are_refused():
 def test_a_unit_has_a_name():
     with pytest.raises(ValueError, match='^length_unit: expected the name of a unit, such as mm, got " "'):
         FlowEstimator(pixel_pitch=0.1, length_unit=" ")
+
+
+def test_colour_frames_are_refused_with_the_option_that_takes_them():
+    with pytest.raises(ValueError, match=r'^frames: expected .*pass preprocess=Preprocess\(colour="luminance"\)'):
+        jacoflow.estimate(np.zeros((4, 24, 32, 3), np.uint8))
+    with pytest.raises(ValueError, match=r'^first: expected a grey frame .*pass preprocess=Preprocess\(colour="luminance"\)'):
+        jacoflow.flow(*np.zeros((2, 24, 32, 3), np.uint8))
