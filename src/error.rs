@@ -88,6 +88,12 @@ impl Error {
         Self::Argument { argument, expected: expected.into(), got: shortened(got.to_string()) }
     }
 
+    /// An argument of a wrong shape.
+    pub fn shape(argument: &'static str, expected: &[usize], got: &[usize]) -> Self {
+        let [expected, got] = [expected, got].map(|axes| format!("shape {}", shape_text(axes)));
+        Self::argument(argument, expected, got)
+    }
+
     /// The same error about an argument of another name.
     pub(crate) fn about(self, argument: &'static str) -> Self {
         match self {

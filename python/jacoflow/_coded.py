@@ -29,18 +29,18 @@ def luma(frame: Any) -> NDArray[Any]:
 
 
 def holds_colour(frame: Any) -> bool:
-    """Whether any chroma differs from grey by more than the rounding of a conversion."""
+    """Whether any chroma differs from grey by more than the rounding of a conversion, a level of 8 bit."""
     planar = _planar(frame)
     if len(planar.planes) < 3:
         return False
     bits = depth(planar)
     middle, shift = 1 << (bits - 1), 16 - bits if bits > 8 else 0
-    return any((np.abs((_plane(planar, k) >> shift).astype(int) - middle) > 1).any() for k in (1, 2))
+    return any((np.abs((_plane(planar, k) >> shift).astype(int) - middle) > 1 << max(bits - 8, 0)).any() for k in (1, 2))
 
 
 def _planar(frame: Any) -> Any:
     is_planar = frame.format.name.startswith(_LUMA_FIRST) and "yuyv" not in frame.format.name
-    return frame if is_planar else frame.reformat(format="yuv444p")
+    return frame if is_planar else frame.reformat(format="yuv444p16le" if depth(frame) > 8 else "yuv444p")
 
 
 def _plane(frame: Any, index: int) -> NDArray[Any]:

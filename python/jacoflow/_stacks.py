@@ -77,8 +77,9 @@ def _stack(request: Request, shape: tuple[int, ...], get: Callable[[int], Frame]
 def _chosen(request: Request, shapes: Mapping[str, tuple[int, ...]]) -> str:
     """The array named by the request, else the only one with the axes of frames."""
     if request.key is not None:
-        if request.key in shapes:
-            return request.key
+        for key in (request.key, request.key.lstrip("/")):
+            if key in shapes:
+                return key
         raise ValueError(f"key: expected one of {sorted(shapes)}, got {request.key!r}")
     candidates = [name for name, shape in shapes.items() if 2 <= len(shape) <= 4 and math.prod(shape) > 1]
     if len(candidates) == 1:

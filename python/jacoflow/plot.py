@@ -118,6 +118,8 @@ def quiver(
         size = getattr(field, "frame_size", None)
         expected, shape = ("a grey frame (H, W)", (None, None)) if size is None else (f"the field's frame, shape {size[::-1]}", size[::-1])
         axes.imshow(numbers("frame", frame, expected, shape), cmap="gray", interpolation="nearest")
+    # Sites without flow belong to the picture too.
+    axes.update_datalim(np.column_stack((np.ravel(x), np.ravel(y))))
     if flow.ndim == 3:
         step = max(1, round(max(flow.shape[:2]) / 24)) if step is None else step
         step = positive_integer("step", step)

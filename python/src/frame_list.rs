@@ -1,7 +1,7 @@
 //! A sequence of frames as Python gives it: a stack, a list, an iterator, or a reader of a file.
 
 use super::arrays::{ColourRule, frame_with_gaps, native};
-use super::samples::refuse_path;
+use super::samples::refuse_other;
 use crate::errors::Outcome;
 use jacoflow::error::shape_text;
 use jacoflow::types::AnyFrame;
@@ -61,6 +61,7 @@ impl<'py> Frames<'py> {
         if is_sequence {
             return Ok(Self::of(object.clone(), object.len()?, colour));
         }
+        refuse_other("frames", object)?;
         let reader = object.py().import("jacoflow._readers")?.getattr("FrameReader")?;
         if object.is_instance(&reader)? {
             let (list, noted) = Noted::read(object)?;
@@ -71,7 +72,6 @@ impl<'py> Frames<'py> {
             let list = PyList::new(object.py(), list)?;
             return Ok(Self::of(list.as_any().clone(), list.len(), colour));
         }
-        refuse_path("frames", object)?;
         let array = native(object)?;
         let shape = array.shape().to_vec();
         let wanted = match colour {

@@ -249,12 +249,9 @@ pub fn write_frames(
 ) -> Outcome<usize> {
     let spec = path.to_string_lossy().into_owned();
     let mut items = frames.try_iter()?;
-    let first = items.next().transpose()?;
-    let is_colour = match &first {
-        Some(first) => arrays::as_array("frames", first)?.ndim() == 3,
-        None => false,
-    };
-    let items = first.into_iter().map(Ok).chain(items);
+    let first = items.next().ok_or_else(|| Error::argument("frames", "at least one frame (H, W)", "none"))??;
+    let is_colour = arrays::as_array("frames", &first)?.ndim() == 3;
+    let items = std::iter::once(Ok(first)).chain(items);
     let named = |error: Error| renamed(error, "output", "path");
     if is_colour {
         write_all(py, items, open_colour_sink(&spec, frame_rate).map_err(named)?, |item| colour_frame("frames", item))

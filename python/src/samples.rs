@@ -5,7 +5,7 @@ use jacoflow::types::LARGEST_EXACT_INTEGER;
 use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyString;
+use pyo3::types::{PyDict, PyString};
 
 /// Whether the object is a numpy array with a mask of its own.
 pub fn is_masked(object: &Bound<'_, PyAny>) -> Outcome<bool> {
@@ -54,14 +54,18 @@ fn expect_exact(argument: &str, array: &Bound<'_, PyUntypedArray>, masked: bool)
     Ok(())
 }
 
-/// Refuses the name of a file where its frames are expected.
-pub fn refuse_path(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<()> {
+/// Refuses what is no array: the name of a file, None, a dictionary.
+pub fn refuse_other(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<()> {
     if object.is_instance_of::<PyString>() || object.hasattr("__fspath__")? {
         return Err(PyTypeError::new_err(format!(
             "{argument}: expected an array, got the name of a file ({}); open it with jacoflow.io.frames(path)",
             object.str()?
         ))
         .into());
+    }
+    if object.is_none() || object.is_instance_of::<PyDict>() {
+        let got = if object.is_none() { "None".into() } else { object.get_type().name()?.to_string() };
+        return Err(PyTypeError::new_err(format!("{argument}: expected an array, got {got}")).into());
     }
     Ok(())
 }

@@ -227,7 +227,8 @@ fn in_words(summary: &Value) -> String {
         lines.push(format!("{:<14}{}", "first frame", statistics_line(&summary["first_frame"])));
     }
     for (name, plane) in summary["planes"].as_object().into_iter().flatten() {
-        lines.push(format!("{:<14}{}", name, statistics_line(plane)));
+        let unit = summary["units"][name].as_str().unwrap_or_default();
+        lines.push(format!("{name:<14}{}  {unit}", statistics_line(plane)).trim_end().to_string());
     }
     lines.join("\n") + "\n"
 }

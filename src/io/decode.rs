@@ -4,7 +4,8 @@ use super::limits::{MAX_SIDE, check_size, io_error, memory_limit};
 use super::{channels::ChannelPolicy, channels::Channels, jpeg, pages::Pages, planes::PlaneSelection};
 use crate::error::{Error, Result};
 use crate::types::Sample;
-use ::image::{DynamicImage, ImageError, ImageFormat, ImageReader};
+use ::image::metadata::Orientation;
+use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -13,7 +14,8 @@ use std::path::Path;
 pub(crate) const EXTENSIONS: &[&str] = &["png", "tif", "tiff", "bmp", "pgm", "pnm", "ppm", "jpg", "jpeg"];
 
 /// Reads the picture in an image file by its content, not its extension: a grey frame with a policy of type
-/// [`Colour`](super::Colour), a colour frame with one of type [`Grey`](super::Grey).
+/// [`Colour`](super::Colour), a colour frame with one of type [`Grey`](super::Grey). Pictures of cameras are
+/// turned as their EXIF data say for the display.
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is damaged, of an unknown format or
@@ -52,7 +54,8 @@ pub(crate) fn is_tiff(path: &Path) -> Result<bool> {
     Ok(matches!(&signature[..], b"II*\0" | b"II+\0" | b"MM\0*" | b"MM\0+"))
 }
 
-fn guessing_reader(path: &Path) -> Result<ImageReader<BufReader<File>>> {
+/// A reader of the picture, and the bytes that it may take.
+fn guessing_reader(path: &Path) -> Result<(ImageReader<BufReader<File>>, u64)> {
     let file = File::open(path).map_err(|e| Error::io(path, e))?;
     let memory = memory_limit(&file).map_err(|e| Error::io(path, e))?;
     let mut reader = ImageReader::new(BufReader::with_capacity(1 << 16, file))
@@ -63,11 +66,11 @@ fn guessing_reader(path: &Path) -> Result<ImageReader<BufReader<File>>> {
     limits.max_image_height = Some(MAX_SIDE as u32);
     limits.max_alloc = Some(memory);
     reader.limits(limits);
-    Ok(reader)
+    Ok((reader, memory))
 }
 
 fn read_one_picture<P: ChannelPolicy>(path: &Path, policy: P) -> Result<P::Frame> {
-    let reader = guessing_reader(path)?;
+    let (reader, memory) = guessing_reader(path)?;
     if reader.format() == Some(ImageFormat::Jpeg)
         && !jpeg::is_whole(&std::fs::read(path).map_err(|e| Error::io(path, e))?)
     {
@@ -76,7 +79,12 @@ fn read_one_picture<P: ChannelPolicy>(path: &Path, policy: P) -> Result<P::Frame
     if reader.format().is_none() {
         return Err(Error::format(path, "not an image of a known format (PNG, TIFF, BMP, PGM, JPEG)"));
     }
-    let picture = reader.decode().map_err(|error| image_error(path, error))?;
+    if reader.format() == Some(ImageFormat::Png) && is_animated(path) {
+        let message =
+            "an animated PNG, of several pictures; expected one (ffmpeg -i FILE frames/%06d.png takes them out)";
+        return Err(Error::format(path, message));
+    }
+    let picture = upright(reader, memory).map_err(|error| image_error(path, error))?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     check_size(path, width, height)?;
     let place = Place { path, width, height };
@@ -105,6 +113,25 @@ impl Place<'_> {
     fn frame<S: Sample, P: ChannelPolicy>(&self, count: usize, samples: Vec<S>, policy: P) -> Result<P::Frame> {
         policy.frame(Channels { path: self.path, width: self.width, height: self.height, count, samples })
     }
+}
+
+/// The picture, turned as its EXIF data say for the display.
+fn upright(reader: ImageReader<BufReader<File>>, memory: u64) -> ImageResult<DynamicImage> {
+    let mut decoder = reader.into_decoder()?;
+    let mut limits = ::image::Limits::default();
+    limits.max_alloc = Some(memory);
+    limits.reserve(decoder.total_bytes())?;
+    // Damaged EXIF data are no reason to refuse a picture.
+    let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+    let mut picture = DynamicImage::from_decoder(decoder)?;
+    picture.apply_orientation(orientation);
+    Ok(picture)
+}
+
+fn is_animated(path: &Path) -> bool {
+    let Ok(file) = File::open(path) else { return false };
+    let reader = png::Decoder::new(BufReader::new(file)).read_info();
+    reader.is_ok_and(|reader| reader.info().animation_control().is_some())
 }
 
 fn image_error(path: &Path, error: ImageError) -> Error {

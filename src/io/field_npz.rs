@@ -12,7 +12,7 @@
 //! | `metadata` | text | JSON: model, parameters, units, sites, frame, library version, options |
 
 use super::{npy::Element, npz::NpzReader, npz::NpzWriter};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shape_text};
 use crate::math::Real;
 use crate::types::{FieldLayout, FlowField, Interval, Rect, SamplingGrid, Status, Units};
 use serde::{Deserialize, Serialize};
@@ -285,7 +285,11 @@ struct Shape {
 impl Shape {
     fn check<R: Read + Seek>(self, npz: &NpzReader<R>, name: &str, got: &[usize], planes: Option<usize>) -> Result<()> {
         let wanted: Vec<usize> = planes.into_iter().chain([self.height, self.width]).collect();
-        if got == wanted { Ok(()) } else { Err(npz.wrong(name, &format!("has shape {got:?}, expected {wanted:?}"))) }
+        if got == wanted {
+            return Ok(());
+        }
+        let [got, wanted] = [got, &wanted].map(shape_text);
+        Err(npz.wrong(name, &format!("has shape {got}, expected {wanted}")))
     }
 
     fn planes<T: Real, R: Read + Seek>(

@@ -283,6 +283,8 @@ fn info_reads_results() {
         assert!((mean - 0.3).abs() < 0.1, "{name}: {mean}");
         assert!(place.good(&format!("info {name}")).out.contains("mean"));
     }
+    place.good("flow s.npy -o rates.npz --fps 50");
+    assert!(place.good("info rates.npz").out.lines().any(|line| line.starts_with("u_x") && line.ends_with(" 1/s")));
     place.good("filter s.npy -o fields --form fast --save-state state.npz");
     let info = place.good("info state.npz --json").json();
     assert_eq!((info["kind"].as_str(), info["frames"].as_u64()), (Some("filter state"), Some(3)));

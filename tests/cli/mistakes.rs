@@ -58,6 +58,7 @@ fn unusable_arguments_are_named() {
         ("flow s.npy --start 9", &["input"]),
         ("measure s.npy --quantity rpm", &["fps"]),
         ("measure s.npy --quantity beauty", &["quantity", "divergence"]),
+        ("measure s.npy --quantity vorticity", &["quantity", "did you mean \"curl\""]),
         ("measure s.npy --quantity curl --method horn-schunck", &["method"]),
         ("measure s.npy --quantity curl -o rows.txt", &["output", ".csv"]),
         ("measure s.npy --quantity curl --json", &["output"]),

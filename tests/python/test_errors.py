@@ -36,13 +36,13 @@ GOOD = np.zeros((3, 8, 10), np.uint8)
         ([np.zeros((8, 10, 2), np.uint8)] * 3, ValueError, r"frames: expected a frame \(H, W\), got shape \(8, 10, 2\)"),
         ("clip.mp4", TypeError, r"frames: expected an array, got the name of a file \(clip.mp4\); open it with jacoflow.io.frames\(path\)"),
         (Path("clip.mp4"), TypeError, r"frames: expected an array, got the name of a file \(clip.mp4\)"),
-        (None, TypeError, "frames|array|object"),
+        (None, TypeError, "frames: expected an array, got None"),
+        ([None, None, None], TypeError, "frames: expected an array, got None"),
+        ({"frames": GOOD}, TypeError, "frames: expected an array, got dict"),
     ],
 )
 @pytest.mark.parametrize("method", ["windowed", "instantaneous"])
 def test_frames_that_cannot_be_used(frames, error, message, method):
-    if error is TypeError and isinstance(frames, str | None):
-        error = (TypeError, ValueError)
     with pytest.raises(error, match=message):
         jacoflow.estimate(frames, method=method)
 

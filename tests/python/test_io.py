@@ -97,6 +97,42 @@ def test_images(frames, tmp_path):
     assert_array_equal(io.read_image(path), frames[0])
 
 
+@pytest.mark.parametrize(("largest", "levels"), [(255, [0, 1, 100]), (100, [0, 3, 255]), (65535, [0, 1, 100]), (1023, [0, 64, 6406])])
+@pytest.mark.parametrize("kind", ["P2", "P5"])
+def test_white_of_a_pgm_is_that_of_the_dtype(largest, levels, kind, tmp_path):
+    samples = np.array([0, 1, 100], np.uint8 if largest < 256 else ">u2")
+    body = b"0 1 100\n" if kind == "P2" else samples.tobytes()
+    (tmp_path / "a.pgm").write_bytes(f"{kind}\n3 1\n{largest}\n".encode() + body)
+    assert_array_equal(io.read_image(tmp_path / "a.pgm"), [levels])
+
+
+@pytest.mark.parametrize(("orientation", "turned"), [(1, lambda a: a), (3, lambda a: a[::-1, ::-1]), (6, lambda a: np.rot90(a, -1)), (8, np.rot90)])
+def test_photographs_are_turned_as_they_say(orientation, turned, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    levels = np.add.outer(np.arange(32), 3 * np.arange(48)).astype(np.uint8)
+    exif = image.Exif()
+    exif[0x0112] = orientation
+    image.fromarray(levels).save(tmp_path / "a.jpg", quality=100, exif=exif)
+    (frame,) = io.frames(tmp_path / "a.jpg")
+    assert frame.shape == turned(levels).shape
+    assert np.abs(frame - turned(levels).astype(float)).max() < 3
+
+
+def test_animated_png_is_no_picture(frames, tmp_path):
+    image = pytest.importorskip("PIL.Image")
+    first, *others = map(image.fromarray, frames)
+    first.save(tmp_path / "a.png", save_all=True, append_images=others)
+    with pytest.raises(jacoflow.FormatError, match="animated PNG, of several pictures"):
+        io.read_image(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize("name", ["a.npy", "a.y4m", "a"])
+def test_no_frames_make_no_file(name, tmp_path):
+    with pytest.raises(ValueError, match=r"^frames: expected at least one frame \(H, W\), got none"):
+        io.write_frames(tmp_path / name, iter([]))
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.fixture
 def colour_frames():
     return np.random.default_rng(4).integers(0, 256, (4, 10, 12, 3)).astype(np.uint8)

@@ -108,6 +108,9 @@ def test_drawing_into_given_axes_makes_no_figure(pyplot, turning):
 def test_fields_without_any_known_value_are_drawn(pyplot):
     field = make_field(np.full((6, 7, 2), np.nan), np.full((6, 7, 2, 2), np.nan))
     plot.overview(field).canvas.draw()
+    axes = plot.quiver(field)
+    axes.figure.canvas.draw()
+    assert axes.get_xlim()[1] >= 6 and axes.get_ylim()[0] >= 5, "the whole field is shown"
 
 
 @pytest.mark.parametrize("draw", [plot.flow_colour, plot.flow_image, plot.divergence, plot.quiver])

@@ -207,11 +207,13 @@ def test_the_program_ffmpeg_gives_the_same_frames(clip, monkeypatch, tmp_path):
         clip,
         encode(tmp_path / "raw.avi", "rawvideo", "bgr24", colour, "rgb24"),
         encode(tmp_path / "deep.mkv", "ffv1", "gray12le", [image.astype(np.uint16) << 4 | 5 for image in PICTURES], "gray12le"),
+        encode(tmp_path / "deep_rgb.mkv", "ffv1", "gbrp16le", [image.astype(np.uint16) << 8 | 0x35 for image in colour], "rgb48le"),
         encode(tmp_path / "vfr.mkv", "ffv1", "gray", PICTURES, "gray", milliseconds=[0, 40, 100, 300]),
         encode(tmp_path / "phone.mkv", "ffv1", "gray", PICTURES, "gray", rotation=90),
     ]
     for path in files:
         with_pyav = list(io.frames(path).timed())
+        assert with_pyav[0][1].dtype == (np.uint16 if path.name.startswith("deep") else np.uint8)
         with monkeypatch.context() as patch:
             patch.setitem(sys.modules, "av", None)
             patch.setenv("PATH", str(tmp_path / "bin"))

@@ -73,13 +73,8 @@ pub fn unit(layout: &FieldLayout, name: &str) -> Result<String> {
 
 fn quantity(layout: &FieldLayout, name: &str) -> Result<Quantity> {
     Quantity::parse(name).map_err(|_| {
-        let quantities = Quantity::ALL.iter().map(|q| q.name());
-        let names: Vec<&str> = layout.parameters.iter().map(String::as_str).chain(quantities).collect();
-        let expected = match Quantity::suggestion(name) {
-            Some(meant) => format!("a name (did you mean {:?}?), one of {}", meant.name(), names.join(", ")),
-            None => format!("one of {}", names.join(", ")),
-        };
-        Error::argument("name", expected, format!("{name:?}"))
+        let parameters: Vec<&str> = layout.parameters.iter().map(String::as_str).collect();
+        Error::argument("name", Quantity::expected(name, &parameters), format!("{name:?}"))
     })
 }
 

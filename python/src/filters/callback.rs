@@ -2,7 +2,7 @@
 
 use crate::arrays;
 use crate::errors::{Outcome, Raised};
-use jacoflow::error::{Error, Result};
+use jacoflow::error::{Error, Result, shape_text};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -32,8 +32,9 @@ impl Callbacks {
             let result = function(py, arrays.collect::<Outcome<_>>()?)?;
             let (shape, values) = arrays::doubles(name, &result)?;
             if shape != shape_out {
-                let expected = format!("a function that returns shape {shape_out:?} for {:?}", inputs[0].0);
-                return Err(Error::argument(name, expected, format!("shape {shape:?}")).into());
+                let [given, wanted, got] = [inputs[0].0, shape_out, &shape].map(shape_text);
+                let expected = format!("a function that returns shape {wanted} for {given}");
+                return Err(Error::argument(name, expected, format!("shape {got}")).into());
             }
             out.copy_from_slice(&values);
             Ok(())

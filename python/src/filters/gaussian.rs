@@ -176,7 +176,7 @@ impl GaussianFilter {
     }
 
     fn wrong(&self, index: usize, got: &[usize]) -> Raised {
-        Error::argument(NAMES[index], format!("shape {:?}", self.shape(index)), format!("shape {got:?}")).into()
+        Error::shape(NAMES[index], &self.shape(index), got).into()
     }
 
     /// `value` for array `index`: a copy, spread over the batch; a number for a covariance is a multiple of
@@ -222,8 +222,7 @@ impl GaussianFilter {
         }
         let scalar = shape.is_empty() && total == 1;
         if !scalar && shape != self.shape(4) {
-            let got = format!("shape {shape:?}");
-            return Err(Error::argument("z", format!("shape {:?}", self.shape(4)), got).into());
+            return Err(Error::shape("z", &self.shape(4), &shape).into());
         }
         Ok(values)
     }

@@ -35,9 +35,7 @@ impl KalmanFilter {
     ) -> Outcome<(Vec<usize>, Vec<f64>)> {
         let (shape, values) = arrays::doubles(name, value)?;
         if shape != tail && shape != lead(batch, &tail) {
-            return Err(
-                Error::argument(name, format!("shape {:?}", lead(batch, &tail)), format!("shape {shape:?}")).into()
-            );
+            return Err(Error::shape(name, &lead(batch, &tail), &shape).into());
         }
         Ok((shape, values))
     }

@@ -3,7 +3,7 @@
 use super::gaussian::GaussianFilter;
 use crate::arrays;
 use crate::errors::Outcome;
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::filter::Smoothed;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -69,8 +69,9 @@ pub fn filtered(
             }
             _ => {
                 let times = times.map_or("T".to_owned(), |times| times.to_string());
-                let expected = format!("{times} arrays of shape {one:?}");
-                Err(Error::argument(name, expected, format!("shape {shape:?}")).into())
+                let [one, got] = [&one, &shape].map(|axes| shape_text(axes));
+                let expected = format!("{times} arrays of shape {one}");
+                Err(Error::argument(name, expected, format!("shape {got}")).into())
             }
         }
     };

@@ -69,10 +69,10 @@ impl MerweScaledSigmaPoints {
         let (shape_p, covariance) = arrays::doubles("P", P)?;
         let n = self.n;
         if shape != [n] {
-            return Err(Error::argument("x", format!("shape [{n}]"), format!("shape {shape:?}")).into());
+            return Err(Error::shape("x", &[n], &shape).into());
         }
         if shape_p != [n, n] {
-            return Err(Error::argument("P", format!("shape [{n}, {n}]"), format!("shape {shape_p:?}")).into());
+            return Err(Error::shape("P", &[n, n], &shape_p).into());
         }
         let points = self.points.sigma_points(&mean, &covariance)?;
         arrays::owned(x.py(), &[SigmaPoints::count(n), n], points)

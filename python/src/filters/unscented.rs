@@ -7,7 +7,7 @@ use super::sigma_points::MerweScaledSigmaPoints;
 use crate::errors::Outcome;
 use crate::options::Integer;
 use crate::{arrays, keywords::getters};
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::filter::UnscentedFilter as Core;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -59,7 +59,7 @@ fn step(name: &'static str, value: &Bound<'_, PyAny>) -> Outcome<f64> {
     let (shape, values) = arrays::doubles(name, value)?;
     match (shape.is_empty(), values.as_slice()) {
         (true, [dt]) => Ok(*dt),
-        _ => Err(Error::argument(name, "a number", format!("shape {shape:?}")).into()),
+        _ => Err(Error::argument(name, "a number", format!("shape {}", shape_text(&shape))).into()),
     }
 }
 

@@ -19,16 +19,13 @@ impl Measured {
     /// The one called `name`.
     ///
     /// # Errors
-    /// As [`Quantity::parse`].
+    /// [`Error::Argument`] named `quantity` for an unknown name.
     pub fn parse(name: &str) -> Result<Self> {
         match MOTION_NAMES.iter().position(|known| *known == name) {
             Some(place) => Ok(Self::Parameter(place)),
-            None => Quantity::parse(name).map(Self::Derived).map_err(|error| match error {
-                Error::Argument { argument, expected, got } => {
-                    Error::Argument { argument, expected: format!("{} or {expected}", MOTION_NAMES.join(", ")), got }
-                }
-                other => other,
-            }),
+            None => Quantity::parse(name)
+                .map(Self::Derived)
+                .map_err(|_| Error::argument("quantity", Quantity::expected(name, &MOTION_NAMES), format!("{name:?}"))),
         }
     }
 

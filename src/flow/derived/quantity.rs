@@ -113,8 +113,15 @@ impl Quantity {
         }
     }
 
+    /// What is expected where `name` is no quantity: a suggestion, `others` that are known there, all quantities.
+    pub fn expected(name: &str, others: &[&str]) -> String {
+        let names: Vec<&str> = others.iter().copied().chain(Self::ALL.iter().map(|q| q.name())).collect();
+        let suggestion = Self::suggestion(name).map(|meant| format!("a name (did you mean {:?}?), ", meant.name()));
+        format!("{}one of {}", suggestion.unwrap_or_default(), names.join(", "))
+    }
+
     /// The quantity that people mean by `name`: one of another convention, or the beginning of one of ours.
-    pub fn suggestion(name: &str) -> Option<Self> {
+    fn suggestion(name: &str) -> Option<Self> {
         const SYNONYMS: [(&str, Quantity); 14] = [
             ("vorticity", Quantity::Curl),
             ("rotation", Quantity::AngularVelocity),

@@ -1,7 +1,7 @@
 //! The shape of an array, as tifffile writes it into the first page: `{"shape": [..], "axes": ".."}`.
 
 use super::recording::{Axis, Recording, Sizes};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, shape_text};
 use serde_json::Value;
 use std::path::Path;
 
@@ -49,8 +49,9 @@ pub(super) fn parse(
             // One axis that is not named is a sequence.
             _ if long.len() == 1 => (Axis::Time, &mut sizes.times),
             _ => {
+                let outer = shape_text(outer);
                 let message = format!(
-                    "holds planes of shape {outer:?} along axes that are not all named T, C or Z; save it with their names (in tifffile metadata={{\"axes\": \"TCYX\"}}), or one channel a file"
+                    "holds planes of shape {outer} along axes that are not all named T, C or Z; save it with their names (in tifffile metadata={{\"axes\": \"TCYX\"}}), or one channel a file"
                 );
                 return Err(Error::format(path, message));
             }

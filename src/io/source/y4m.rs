@@ -144,8 +144,8 @@ impl<R: BufRead, P: ChannelPolicy> Y4mSource<R, P> {
             ColourUse::Refused => {
                 let planes = self.read_bytes(self.chroma_bytes())?;
                 let middle = 1_u16 << (self.layout.bits - 1);
-                // Conversion from red, green and blue rounds.
-                if self.codes(&planes).any(|code| code.abs_diff(middle) > 1) {
+                // Conversion from red, green and blue rounds to about a level of 8 bit.
+                if self.codes(&planes).any(|code| code.abs_diff(middle) > 1 << (self.layout.bits - 8)) {
                     return Err(refuse_colour(&self.name));
                 }
             }

@@ -87,7 +87,7 @@ impl ParticleFilter {
         }
         let full = lead(self.batch, &[n, n]);
         if shape != [n, n] && shape != full {
-            return Err(Error::argument(name, format!("shape {full:?}"), format!("shape {shape:?}")).into());
+            return Err(Error::shape(name, &full, &shape).into());
         }
         Ok(values)
     }
@@ -97,7 +97,7 @@ impl ParticleFilter {
 pub(super) fn particles(value: &Bound<'_, PyAny>, expected: &[usize]) -> Outcome<Vec<f64>> {
     let (shape, values) = arrays::doubles("x", value)?;
     if shape != expected {
-        return Err(Error::argument("x", format!("shape {expected:?}"), format!("shape {shape:?}")).into());
+        return Err(Error::shape("x", expected, &shape).into());
     }
     check_mean(&values)?;
     Ok(values)

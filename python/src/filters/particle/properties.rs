@@ -72,8 +72,7 @@ impl ParticleFilter {
         let mut core = lock(&self.core)?;
         let expected = lead(self.batch, &[core.particles()]);
         if shape != expected {
-            let got = format!("shape {shape:?}");
-            return Err(Error::argument("log_weights", format!("shape {expected:?}"), got).into());
+            return Err(Error::shape("log_weights", &expected, &shape).into());
         }
         Ok(core.set_log_weights(&values)?)
     }

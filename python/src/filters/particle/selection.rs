@@ -2,7 +2,7 @@
 
 use crate::errors::Outcome;
 use crate::{arrays, options::Integer, options::count};
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::filter::particle::{Resampling, resample_indices};
 use jacoflow::math::random::CounterRng;
 use pyo3::prelude::*;
@@ -65,7 +65,7 @@ fn checked_weights(object: &Bound<'_, PyAny>) -> Outcome<Vec<f64>> {
     let refuse =
         |got: String| Err(Error::argument("weights", "finite numbers (N,), none below 0, one above 0", got).into());
     if shape.len() != 1 {
-        return refuse(format!("shape {shape:?}"));
+        return refuse(format!("shape {}", shape_text(&shape)));
     }
     if let Some(value) = values.iter().find(|v| !(v.is_finite() && **v >= 0.0)) {
         return refuse(value.to_string());
@@ -76,7 +76,7 @@ fn checked_weights(object: &Bound<'_, PyAny>) -> Outcome<Vec<f64>> {
 fn checked_uniforms(object: &Bound<'_, PyAny>) -> Outcome<Vec<f64>> {
     let (shape, values) = arrays::doubles("uniforms", object)?;
     let wrong = values.iter().find(|v| !(0.0..=1.0).contains(*v)).map(ToString::to_string);
-    match wrong.or_else(|| (shape.len() > 1).then(|| format!("shape {shape:?}"))) {
+    match wrong.or_else(|| (shape.len() > 1).then(|| format!("shape {}", shape_text(&shape)))) {
         Some(got) => Err(Error::argument("uniforms", "numbers from 0 to 1, shape (k,)", got).into()),
         None => Ok(values),
     }

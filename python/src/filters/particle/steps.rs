@@ -5,7 +5,7 @@ use crate::arrays;
 use crate::errors::Outcome;
 use crate::filters::callback::{Callbacks, lead, lock};
 use crate::options::{Integer, count};
-use jacoflow::error::Error;
+use jacoflow::error::{Error, shape_text};
 use jacoflow::filter::particle::{ParticleFilter as Core, Resampling};
 use pyo3::prelude::*;
 
@@ -18,7 +18,7 @@ impl ParticleFilter {
     fn quantile<'py>(&self, py: Python<'py>, q: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyAny>> {
         let (axes, levels) = arrays::doubles("q", q)?;
         if axes.len() > 1 {
-            return Err(Error::argument("q", "a number or shape (k,)", format!("shape {axes:?}")).into());
+            return Err(Error::argument("q", "a number or shape (k,)", format!("shape {}", shape_text(&axes))).into());
         }
         self.estimate(py, &axes, &[self.dim_x], |core| core.quantiles(&levels))
     }
@@ -30,7 +30,7 @@ impl ParticleFilter {
         let (shape, values) = arrays::doubles("mean", mean)?;
         let full = lead(self.batch, &[self.dim_x]);
         if shape != [self.dim_x] && shape != full {
-            return Err(Error::argument("mean", format!("shape {full:?}"), format!("shape {shape:?}")).into());
+            return Err(Error::shape("mean", &full, &shape).into());
         }
         let covariance = self.matrix("covariance", covariance)?;
         let mut core = lock(&self.core)?;
@@ -112,8 +112,9 @@ impl ParticleFilter {
         } else {
             let (shape, values) = arrays::doubles("log_likelihood", log_likelihood)?;
             if shape != shape_out {
-                let expected = format!("a function or shape {shape_out:?}");
-                return Err(Error::argument("log_likelihood", expected, format!("shape {shape:?}")).into());
+                let [wanted, got] = [&shape_out, &shape].map(|axes| shape_text(axes));
+                let expected = format!("a function or shape {wanted}");
+                return Err(Error::argument("log_likelihood", expected, format!("shape {got}")).into());
             }
             py.detach(|| {
                 work.update(|_, out| {
