@@ -140,6 +140,9 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("gradient.unsettled", "the covariance holds the motion of an outline that is still learned"),
     ("gradient.wild_frame", "a frame that differs from all before is passed over"),
     ("gradient.with_camera", "the target may move with the camera"),
+    ("measure.common_residual", "what residuals have in common over parts of a region widens its covariance"),
+    ("measure.jacobian_change", "what Jacobians would change in the motion of a region widens its covariance"),
+    ("measure.scatter", "sites of one motion may differ beyond their covariances"),
     ("windowed.noise_dominated", "the covariance is inflated along directions that only noise determines"),
 ];
 

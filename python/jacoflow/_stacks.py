@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib
 import math
 import os
@@ -77,9 +78,8 @@ def _stack(request: Request, shape: tuple[int, ...], get: Callable[[int], Frame]
 def _chosen(request: Request, shapes: Mapping[str, tuple[int, ...]]) -> str:
     """The array named by the request, else the only one with the axes of frames."""
     if request.key is not None:
-        for key in (request.key, request.key.lstrip("/")):
-            if key in shapes:
-                return key
+        if request.key in shapes:
+            return request.key
         raise ValueError(f"key: expected one of {sorted(shapes)}, got {request.key!r}")
     candidates = [name for name, shape in shapes.items() if 2 <= len(shape) <= 4 and math.prod(shape) > 1]
     if len(candidates) == 1:
@@ -117,6 +117,8 @@ def open_npz(request: Request) -> Stack:
 
 def open_hdf5(request: Request) -> Stack:
     """The data set (T, H, W) in an HDF5 file."""
+    # Names may begin at the root, as h5py writes them.
+    request = dataclasses.replace(request, key=request.key and request.key.lstrip("/"))
     sets = _hdf5_sets(request)
     data = sets[_chosen(request, {name: each.shape for name, each in sets.items()})]
     return _stack(request, data.shape, data.__getitem__, lambda: np.asarray(data))

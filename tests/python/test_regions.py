@@ -287,4 +287,4 @@ def test_the_binary_measures_the_parameters_too(tmp_path):
         np.testing.assert_allclose([float(row["value"]), float(row["std"])], [found.value, found.std], rtol=1e-9)
         assert (row["unit"], row["status"]) == (found.unit, "ok")
     refused = subprocess.run([*command[:6], "foo"], capture_output=True, text=True, check=False)
-    assert refused.returncode == 2 and "quantity: expected u, v, u_x" in refused.stderr
+    assert refused.returncode == 2 and "quantity: expected one of u, v, u_x" in refused.stderr

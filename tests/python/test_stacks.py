@@ -82,7 +82,8 @@ def test_several_arrays_need_a_name(saved):
     with pytest.raises(jacoflow.FormatError, match=r"expected one array of frames, or its name as key=; the file holds left \(.*right"):
         io.frames(path)
     assert_array_equal(list(io.frames(path, key="right")), STACK[::-1])
-    assert_array_equal(list(io.frames(path, key="/right")), STACK[::-1])
+    if path.suffix == ".h5":
+        assert_array_equal(list(io.frames(path, key="/right")), STACK[::-1])
     with pytest.raises(ValueError, match=r"key: expected one of \['left', 'right'\], got 'middle'"):
         io.frames(path, key="middle")
 

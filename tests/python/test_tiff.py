@@ -112,7 +112,7 @@ def test_interval_and_scale_come_from_the_file(tmp_path):
 def test_axes_without_names_are_refused(tmp_path):
     path = tmp_path / "stack.tif"
     tifffile.imwrite(path, CHANNELS, photometric="minisblack")
-    with pytest.raises(jacoflow.FormatError, match=r"planes of shape \[5, 2\] along axes that are not all named"):
+    with pytest.raises(jacoflow.FormatError, match=r"planes of shape \(5, 2\) along axes that are not all named"):
         io.frames(path)
     tifffile.imwrite(path, CHANNELS, photometric="minisblack", metadata={"axes": "TCYX"})
     assert_array_equal(read(path, channel=1), CHANNELS[:, 1])

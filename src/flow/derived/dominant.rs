@@ -1,5 +1,6 @@
 //! The affine motion that most of a region follows.
 
+use crate::ablation::keeps;
 use crate::math::{MAD_TO_STD, central_median, random::CounterRng};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2, Vector3};
 
@@ -99,7 +100,7 @@ pub(super) fn dominant_motion(sites: &[Site], wanted: Option<usize>) -> Option<A
         let inliers: Vec<&Site> = compared.iter().copied().filter(|site| motion.holds(site)).collect();
         let mut residuals: Vec<f64> = inliers.iter().flat_map(|site| motion.residual(site).abs().data.0[0]).collect();
         let deviation = MAD_TO_STD * central_median(&mut residuals)?;
-        motion = fit(&inliers, deviation.min(MAX_DEVIATION))?;
+        motion = fit(&inliers, if keeps("measure.scatter") { deviation.min(MAX_DEVIATION) } else { 0.0 })?;
     }
     Some(motion)
 }

@@ -5,6 +5,7 @@ use super::common_residual::common_residual;
 use super::dominant::{Site, dominant_motion};
 use super::region::{carry_to, sites_in, valid_sites};
 use super::sharing::{in_common, sharing_among};
+use crate::ablation::keeps;
 use crate::error::{Error, Result};
 use crate::math::Real;
 use crate::types::{FlowField, MOTION_NAMES, Region, choices};
@@ -145,7 +146,12 @@ pub fn fit_region<T: Real>(
     let common = common_residual(field, &near, (centre, &joint), &floors(field));
     for i in 0..6 {
         for j in 0..6 {
-            covariance[i][j] += common[i][j] + (joint[i] - motion[i]) * (joint[j] - motion[j]);
+            if keeps("measure.common_residual") {
+                covariance[i][j] += common[i][j];
+            }
+            if keeps("measure.jacobian_change") {
+                covariance[i][j] += (joint[i] - motion[i]) * (joint[j] - motion[j]);
+            }
         }
     }
     Ok(RegionMotion { motion, covariance, count, status: RegionStatus::Ok, ..unknown })

@@ -1,0 +1,64 @@
+"""`measure` of regions with two motions, of turning discs and of a noisy plane: how well values and standard
+deviations fit the truth, and the share of regions without a dominant motion."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+import jacoflow
+from benchmarks.scenes import steps
+from benchmarks.tables.limits import SQUARE, eight_bit
+
+SEEDS = tuple(range(10, 18))
+"""Of textures and noise; the constants were chosen on others."""
+DIFFERENCES, RADII, ANGLES, NOISES = (0.1, 0.2, 0.4), (20.0, 30.0, 45.0), (0.02, 0.06), (0.5, 2.0)
+MAX_LOSS = 50.0
+"""So that one wrong value does not hide all others."""
+
+
+def rows() -> dict[str, list[float]]:
+    """One value for each region."""
+    found: dict[str, list[float]] = {name: [] for name in ("two motions", "discs", "plane", "none found")}
+    for seed in SEEDS:
+        picture = steps.texture(seed)
+        for difference in DIFFERENCES:
+            gone = steps.moved(picture, np.eye(2), (difference, 0.0))
+            right = np.arange(steps.SIZE)[None, :] > steps.CENTRE[0]
+            still = steps.moved(picture, np.eye(2))
+            motion = measured(seed, (still, np.where(right, gone, still)), 1.0, "u", SQUARE)
+            # Either motion may be the dominant one.
+            truth = min((0.0, difference), key=lambda u: abs(u - motion.value))
+            add(found, "two motions", motion, truth)
+        y, x = np.mgrid[: steps.SIZE, : steps.SIZE]
+        wall = steps.moved(steps.texture(seed + 100), np.eye(2))
+        for radius in RADII:
+            inside = np.hypot(x - steps.CENTRE[0], y - steps.CENTRE[1]) < radius
+            for angle in ANGLES:
+                pair = [np.where(inside, steps.moved(picture, steps.turn(k * angle)), wall) for k in range(2)]
+                disc = (*steps.CENTRE, radius - 3.0)
+                add(found, "discs", measured(seed, pair, 1.0, "angular_velocity", disc), angle)
+        for noise in NOISES:
+            pair = [steps.moved(picture, np.eye(2)), steps.moved(picture, 1.01 * np.eye(2), (0.37, 0.0))]
+            add(found, "plane", measured(seed, pair, noise, "divergence", SQUARE), 2 * np.log(1.01))
+    return found
+
+
+def measured(
+    seed: int, pair: Sequence[NDArray[np.float64]], noise: float, name: str, region: tuple[float, ...]
+) -> jacoflow.Measurement:
+    """A quantity of a region from two frames with noise."""
+    rng = np.random.default_rng(seed)
+    return jacoflow.flow(*(eight_bit(frame, noise, rng) for frame in pair)).measure(name, region)
+
+
+def add(found: dict[str, list[float]], row: str, motion: jacoflow.Measurement, truth: float) -> None:
+    """Adds the loss (negative logarithm of the normal density of the relative error, less its constant); that of
+    no motion is that of a standard deviation as large as the truth."""
+    is_found = motion.status == "ok"
+    found["none found"].append(float(not is_found))
+    size = max(abs(truth), 0.01)
+    error, std = ((motion.value - truth) / size, motion.std / size) if is_found else (0.0, 1.0)
+    found[row].append(min(0.5 * (error / std) ** 2 + float(np.log(std)), MAX_LOSS))
