@@ -7,6 +7,10 @@
 //! finest detail is taken for biased, and the motion moves by the difference. Their mean squared difference
 //! around a node measures errors that residuals do not show, as the scatter of half samples does (P. C.
 //! Mahalanobis's interpenetrating samples, 1946); the covariance includes it.
+//!
+//! What the frames as they are leave of the motion in narrow windows, without smoothness, is the step that
+//! Lucas and Kanade would take from it. Where it is longer than noise explains, smoothness holds the motion
+//! back (small or curved objects); the covariance includes its mean square, too.
 
 use super::data_term::{COUNT, DataOptions, DataTerm, ERROR, MOTION, normal, right};
 use super::descent::DescentPlan;
@@ -19,6 +23,7 @@ use crate::image::Spline;
 use crate::math::median;
 use crate::simd::SimdReal;
 use rayon::prelude::*;
+use std::f64::consts::PI;
 
 /// Binomial means of the sums, so that windows have standard deviations of 3.4, 8.7 and 14.3 px.
 const MEANS: [usize; 3] = [0, 2, 6];
@@ -28,6 +33,10 @@ const WINDOWS: [f64; 3] = [3.4, 8.7, 14.3];
 const PRIOR: f64 = 0.5;
 /// Maximum difference at a node, px: larger ones are of two motions.
 const MAX_DIFFERENCE: f64 = 0.1;
+/// Mean square of a remainder, over that of white noise, that is taken for chance.
+const CHANCE: f64 = 2.0;
+/// Maximum remainder at a node, px.
+const MAX_REMAINDER: f64 = 1.0;
 /// Bias, px, of which half is removed, and the same as a share of the scatter in the narrow window.
 const DOUBTFUL_BIAS: f64 = 0.02;
 const DOUBTFUL_SHARE: f64 = 0.1;
@@ -48,6 +57,8 @@ pub(super) struct DetailBias {
     correction: Vec<[f64; 2]>,
     /// Mean squared differences around the nodes, px^2, in each of the windows.
     scatter: [Vec<Square>; 3],
+    /// Mean squares around the nodes of what the frames leave of the flow in the narrow window, px^2.
+    remainder: Vec<Square>,
 }
 
 impl DetailBias {
@@ -73,6 +84,7 @@ impl DetailBias {
         });
         smoothed.into_iter().map(Spline::into_memory).for_each(|memory| space.keep(Planes::of_samples(memory)));
         space.keep(data);
+        let remainder = mean_squares(&remainders(&sums[0]), MAX_REMAINDER, size);
         let mut differences = Vec::new();
         let mut done = 0;
         let scatter = MEANS.map(|means| {
@@ -83,15 +95,7 @@ impl DetailBias {
             }
             done = means;
             differences = difference(&sums);
-            let mut squares: Vec<Square> = differences
-                .iter()
-                .map(|[u, v]| [u, v].map(|d| d.clamp(-MAX_DIFFERENCE, MAX_DIFFERENCE)))
-                .map(|[u, v]| [u * u, u * v, v * v])
-                .collect();
-            for _ in 0..2 {
-                binomial_mean(&mut squares, size);
-            }
-            squares
+            mean_squares(&differences, MAX_DIFFERENCE, size)
         });
         let shrunk = |([u, v], [xx, _, yy]): (&[f64; 2], &Square)| {
             let square = u * u + v * v;
@@ -99,7 +103,7 @@ impl DetailBias {
             [kept * u, kept * v]
         };
         let correction = differences.iter().zip(&scatter[0]).map(shrunk).collect();
-        Self { axes, correction, scatter }
+        Self { axes, correction, scatter, remainder }
     }
 
     /// Removes the bias from the motion.
@@ -121,6 +125,14 @@ impl DetailBias {
                 }
             }
         });
+    }
+
+    /// Mean square around a node of what the frames leave of the flow, and the share of it that white noise of a
+    /// density `xx, xy, yy`, px^4, does not explain.
+    pub fn remainder(&self, node: usize, density: &Square) -> (Square, f64) {
+        let [xx, xy, yy] = self.remainder[node];
+        let noise = (density[0] + density[2]) / (4.0 * PI * WINDOWS[0].powi(2));
+        ([xx, xy, yy], (1.0 - CHANCE * noise / (xx + yy)).max(0.0))
     }
 
     /// Mean squared difference around a node in a window of `sigma` px.
@@ -171,20 +183,42 @@ fn site_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, y: usize) -> Vec
     (0..data.width).map(site).collect()
 }
 
+/// Mean squares around the nodes of vectors whose components are at most `most` px.
+fn mean_squares(vectors: &[[f64; 2]], most: f64, size: (usize, usize)) -> Vec<Square> {
+    let bounded = vectors.iter().map(|vector| vector.map(|d| d.clamp(-most, most)));
+    let mut squares: Vec<Square> = bounded.map(|[u, v]| [u * u, u * v, v * v]).collect();
+    for _ in 0..2 {
+        binomial_mean(&mut squares, size);
+    }
+    squares
+}
+
+/// What the sums leave of the flow, px, where smoothness adds `prior` to their information.
+fn solve(&[a, b, c, u, v, _]: &NodeSums, prior: f64) -> [f64; 2] {
+    let (a, c) = (a + prior, c + prior);
+    let determinant = a * c - b * b;
+    if determinant > 0.0 { [(c * u - b * v) / determinant, (a * v - b * u) / determinant] } else { [0.0; 2] }
+}
+
+/// Median residual energy of the nodes.
+fn typical_energy(sums: &[NodeSums]) -> f64 {
+    let mut energies: Vec<f64> = sums.iter().map(|sum| sum[5]).collect();
+    median(&mut energies).unwrap_or(0.0)
+}
+
+/// What the sums leave of the flow of each node, px. Their own energy is not part of the prior: it is large
+/// where much is left.
+fn remainders(sums: &[NodeSums]) -> Vec<[f64; 2]> {
+    let prior = 2.0 * PRIOR * typical_energy(sums);
+    sums.iter().map(|sum| solve(sum, prior)).collect()
+}
+
 /// What the second sums say of the flow beyond the first, px.
 fn difference(sums: &[Vec<NodeSums>; 2]) -> Vec<[f64; 2]> {
-    let typical = sums.each_ref().map(|sums| {
-        let mut energies: Vec<f64> = sums.iter().map(|sum| sum[5]).collect();
-        median(&mut energies).unwrap_or(0.0)
-    });
-    let solve = |&[a, b, c, u, v, energy]: &NodeSums, typical: f64| {
-        let prior = PRIOR * (energy + typical);
-        let (a, c) = (a + prior, c + prior);
-        let determinant = a * c - b * b;
-        if determinant > 0.0 { [(c * u - b * v) / determinant, (a * v - b * u) / determinant] } else { [0.0; 2] }
-    };
+    let typical = sums.each_ref().map(|sums| typical_energy(sums));
     let node = |(fine, smooth): (&NodeSums, &NodeSums)| {
-        let (fine, smooth) = (solve(fine, typical[0]), solve(smooth, typical[1]));
+        let (fine, smooth) =
+            (solve(fine, PRIOR * (fine[5] + typical[0])), solve(smooth, PRIOR * (smooth[5] + typical[1])));
         [smooth[0] - fine[0], smooth[1] - fine[1]]
     };
     sums[0].iter().zip(&sums[1]).map(node).collect()

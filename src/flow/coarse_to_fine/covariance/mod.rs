@@ -11,6 +11,8 @@
 //! * Coarse-level error ([`coarse_level_error`]): without texture, or with texture of one direction only
 //!   ([`constrained_directions`]), finer levels do not correct coarser ones.
 //! * Motion boundaries ([`boundary_error`]): a site near one may have the motion of the other side.
+//! * Remainder ([`DetailBias`](super::detail_bias::DetailBias)): what the frames would still change in narrow
+//!   windows, beyond noise.
 //! * Peak locking ([`PeakLocking`]): a share of the correction may remain.
 //! * Acceleration, three frames only: independent noise, and a share of the acceleration.
 //!
@@ -73,6 +75,10 @@ const DETAIL_SHARES: [f64; 3] = [4.7, 0.0235, 0.0235];
 /// Share of these on coarser levels, whose frames are smooth already.
 const COARSE_DETAIL_SHARE: f64 = 0.2;
 const NOISE_IN_DETAIL: f64 = 0.4;
+
+/// Variance of the flow over the mean square of the remainder that noise does not explain: one step in windows
+/// recovers a part of the error.
+const REMAINDER_SHARE: f64 = 2.0;
 
 /// Minimum nodes of a parallel task.
 const NODES_PER_TASK: usize = 1024;
@@ -146,6 +152,10 @@ pub(super) fn covariance<T: SimdReal>(
             let of_level = if estimate.level == 0 { 1.0 } else { COARSE_DETAIL_SHARE };
             let beyond_noise = of_level * (1.0 - NOISE_IN_DETAIL * noise / (scatter[0] + scatter[2])).max(0.0);
             add_blocks(node, DETAIL_SHARES.map(|share| share * beyond_noise), &scatter);
+        }
+        if let Some(detail) = estimate.detail.as_ref().filter(|_| keeps("flow.remainder")) {
+            let (square, share) = detail.remainder(n, &remaining.density);
+            add_blocks(node, [REMAINDER_SHARE * share, 0.0, 0.0], &square);
         }
         add_locking(node, &motion, &estimate.locking);
         if !is_pair {
