@@ -41,15 +41,11 @@ def held(
     found: jacoflow.FlowField, flow: Array, jacobian: Array, where: NDArray[np.bool_]
 ) -> dict[str, float]:
     """Share of the pixels `where` whose interval holds the truth, for each of `QUANTITIES`."""
-    truth = {
-        "u": flow[..., 0],
-        "v": flow[..., 1],
-        "divergence": jacobian[..., 0, 0] + jacobian[..., 1, 1],
-        "curl": jacobian[..., 1, 0] - jacobian[..., 0, 1],
-    }
+    # Divergence and curl are rates over the step, formed of the true displacement as of the estimated one.
+    truth = jacoflow.FlowField.from_arrays(flow, jacobian=jacobian, interval=found.interval)
     shares = {}
     for name in QUANTITIES:
-        error = np.abs(found.value(name) - truth[name])[where]
+        error = np.abs(found.value(name) - truth.value(name))[where]
         shares[name] = float((error <= NORMAL * found.std(name)[where]).mean())
     return shares
 
