@@ -291,13 +291,13 @@ class FlowField:
         """The parameter or derived quantity `name` of the one affine motion that a region follows, as
         `Measurement`; for a stack at each time.
 
-        `region` as in `region_mean`. The motion is that of more than half of the valid sites, else the status
-        is "no_dominant_motion" and the value NaN; with `at`, a pixel (x, y), that of the sites around it,
-        however few they are. u and v are those at the region's centre, or at `at`. A site follows the motion
-        where its flow differs by no more than its standard deviation and .1 px/frame explain at 99 %: motions
-        that differ by less are not separated, and `std` grows with what they leave. ValueError for unknown
-        names, a region without a site of the field, a pixel outside the frame, and for a field without
-        covariance.
+        `region` as in `region_mean`. The motion is that of more than half of the valid sites, and of more
+        than those whose estimates the frames contradict, else the status is "no_dominant_motion" and the
+        value NaN; with `at`, a pixel (x, y), that of the sites around it, however few they are. u and v are
+        those at the region's centre, or at `at`. A site follows the motion where its flow differs by no more
+        than its standard deviation and .1 px/frame explain at 99 %: motions that differ by less are not
+        separated, and `std` grows with what they leave. ValueError for unknown names, a region without a site
+        of the field, a pixel outside the frame, and for a field without covariance.
 
         >>> import jacoflow
         >>> scene = jacoflow.scenes.Scene("affine", width=96, height=64, u_x=0.01, v_y=0.01)

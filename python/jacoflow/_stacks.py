@@ -7,6 +7,8 @@ import importlib
 import math
 import os
 import weakref
+import zipfile
+import zlib
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -100,7 +102,7 @@ def _package(request: Request, name: str, what: str) -> Any:
 def open_npz(request: Request) -> Stack:
     """The stack (T, H, W) in a .npz archive."""
     try:
-        with np.load(request.source, allow_pickle=False) as archive:
+        with open(request.source, "rb") as file, np.load(file, allow_pickle=False) as archive:
             if not hasattr(archive, "files"):
                 raise FormatError(f"{request.source}: no .npz archive")
             arrays = {name: archive[name] for name in archive.files if request.key in (None, name)}
@@ -109,7 +111,7 @@ def open_npz(request: Request) -> Stack:
                 shapes = dict.fromkeys(archive.files, ())
     except FileNotFoundError:
         raise
-    except (OSError, ValueError, EOFError, KeyError) as error:
+    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise FormatError(f"{request.source}: no .npz archive of plain arrays ({error})") from error
     array = arrays[_chosen(request, shapes)]
     return _stack(request, array.shape, array.__getitem__, lambda: array)
@@ -148,12 +150,9 @@ def open_matlab(request: Request) -> Stack:
 def _old_matlab(request: Request) -> Frame:
     matlab = _package(request, "scipy.io", "MATLAB files before 7.3")
     kinds = {"double", "single", "logical", *(f"{sign}int{bits}" for sign in ("u", "") for bits in (8, 16, 32, 64))}
-    try:
-        shapes = {name: shape for name, shape, kind in matlab.whosmat(request.source) if kind in kinds}
-    except (ValueError, TypeError, NotImplementedError, matlab.matlab.MatReadError) as error:
-        raise FormatError(f"{request.source}: no MATLAB file that can be read ({error})") from error
-    name = _chosen(request, shapes)
-    array: Frame = matlab.loadmat(request.source, variable_names=[name])[name]
+    listed = _readable(request, "MATLAB", lambda: matlab.whosmat(request.source))
+    name = _chosen(request, {name: shape for name, shape, kind in listed if kind in kinds})
+    array: Frame = _readable(request, "MATLAB", lambda: matlab.loadmat(request.source, variable_names=[name])[name])
     return array
 
 
@@ -185,9 +184,9 @@ def open_tifffile(request: Request) -> Stack | None:
         tifffile: Any = importlib.import_module("tifffile")
     except ImportError:
         return None
-    file = _readable(request, lambda: tifffile.TiffFile(request.source))
+    file = _readable(request, "TIFF", lambda: tifffile.TiffFile(request.source))
     try:
-        series = _readable(request, lambda: file.series[0])
+        series = _readable(request, "TIFF", lambda: file.series[0])
         stack = Stack(request, *_series_frames(request, series))
     except BaseException:
         file.close()
@@ -196,14 +195,14 @@ def open_tifffile(request: Request) -> Stack | None:
     return stack
 
 
-def _readable(request: Request, read: Callable[[], Any]) -> Any:
-    """What tifffile reads, or `FormatError`: of damaged files it raises errors of many types."""
+def _readable(request: Request, kind: str, read: Callable[[], Any]) -> Any:
+    """What a package reads, or `FormatError`: of damaged files it raises errors of many types."""
     try:
         return read()
     except (FileNotFoundError, MemoryError):
         raise
     except Exception as error:
-        raise FormatError(f"{request.source}: no TIFF file that can be read ({error})") from error
+        raise FormatError(f"{request.source}: no {kind} file that can be read ({error})") from error
 
 
 def _series_frames(request: Request, series: Any) -> tuple[int, Callable[[int], Frame]]:
@@ -230,7 +229,9 @@ def _series_frames(request: Request, series: Any) -> tuple[int, Callable[[int], 
     is_planar = series.axes[-own:].startswith("S")
 
     def get(k: int) -> Frame:
-        image: Frame = _readable(request, lambda: series.pages[int(pages[k])].asarray())
+        image: Frame = _readable(request, "TIFF", lambda: series.pages[int(pages[k])].asarray())
+        if image.dtype.kind not in "biuf":
+            raise FormatError(f"{request.source}: holds samples of type {image.dtype}; expected integers or floats")
         return np.moveaxis(image, 0, -1) if is_planar else image
 
     return len(pages), get

@@ -141,13 +141,23 @@ class Video:
         if self._stop is not None and self._stop <= self._start:
             return
         try:
-            for index, frame in enumerate(self._container.decode(stream)):
+            for index, frame in enumerate(self._decoded(stream)):
                 if index >= self._start and (index - self._start) % self._step == 0:
                     yield frame.time, _coded.upright(self._image(frame), frame)
                 if self._stop is not None and index + 1 >= self._stop:
                     return
         except self._av.FFmpegError as error:
             raise FormatError(f"{self._path}: decoding stopped ({error})") from error
+
+    def _decoded(self, stream: Any) -> Iterator[Any]:
+        """The frames; `FormatError` where the file is cut off amid one, which decoders fill up."""
+        count = 0
+        for packet in self._container.demux(stream):
+            if packet.is_corrupt:
+                raise FormatError(f"{self._path}: cut off or damaged after {count} frames")
+            for frame in packet.decode():
+                count += 1
+                yield frame
 
     def _image(self, frame: Any) -> NDArray[Any]:
         is_deep = _coded.depth(frame) > 8

@@ -14,8 +14,8 @@ use std::path::Path;
 pub(crate) const EXTENSIONS: &[&str] = &["png", "tif", "tiff", "bmp", "pgm", "pnm", "ppm", "jpg", "jpeg"];
 
 /// Reads the picture in an image file by its content, not its extension: a grey frame with a policy of type
-/// [`Colour`](super::Colour), a colour frame with one of type [`Grey`](super::Grey). Pictures of cameras are
-/// turned as their EXIF data say for the display.
+/// [`Colour`](super::Colour), a colour frame with one of type [`Grey`](super::Grey). JPEG and PNG are turned
+/// as their EXIF data say for the display.
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is damaged, of an unknown format or

@@ -48,8 +48,10 @@ pub fn read_flo(path: impl AsRef<Path>) -> Result<FlowImage> {
     if f32::from_le_bytes(tag) != TAG {
         return Err(Error::format(path, "not a .flo file (its first number is not 202021.25)"));
     }
-    let side = |bytes| usize::try_from(i32::from_le_bytes(bytes)).unwrap_or(0);
-    let (width, height) = (side(width), side(height));
+    let sides = [width, height].map(i32::from_le_bytes);
+    let [Ok(width), Ok(height)] = sides.map(usize::try_from) else {
+        return Err(Error::format(path, format!("a field of {} x {} px", sides[0], sides[1])));
+    };
     check_size(path, width, height)?;
     let (needed, mut data) = (8 * width * height, Vec::new());
     file.take(needed as u64).read_to_end(&mut data).map_err(|e| Error::io(path, e))?;

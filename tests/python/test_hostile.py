@@ -26,6 +26,7 @@ VIEWS = {
     "quantise": lambda frame: jacoflow.quantise(frame),
     "smooth": lambda frame: jacoflow.smooth(frame, 1.0),
     "estimate": lambda frame: jacoflow.estimate([frame] * 3),
+    "stack": lambda frame: jacoflow.estimate(np.broadcast_to(FRAMES[0], (2**36, *FRAMES[0].shape))),
     "estimator": lambda frame: jacoflow.FlowEstimator().push(frame),
     "filter": lambda frame: jacoflow.FlowFilter().push(frame),
     "mask": lambda frame: jacoflow.estimate(FRAMES, mask=endless(frame.shape, bool)),

@@ -124,6 +124,26 @@ def test_where_the_frames_contradict_most_estimates_nothing_is_said():
     assert np.isnan(field.region_mean("u")[0]) and field.measure("u").status == "too_few_sites"
 
 
+def waves(seed, shift=0.0):
+    """Texture of waves of 6 to 20 px that has moved by `shift` px along x."""
+    rng, (y, x) = np.random.default_rng(seed), np.mgrid[:160, :160]
+    directions = rng.normal(size=(40, 2))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True) / (2 * np.pi / rng.uniform(6, 20, (40, 1)))
+    sum_of_waves = sum(np.sin(a * (x - shift) + b * y + rng.uniform(0, 6.3)) for a, b in directions)
+    return 128 + 25 * sum_of_waves / sum_of_waves.std()
+
+
+def test_what_the_frames_contradict_does_not_make_the_rest_dominant():
+    # Still, moving, and unrelated: the still part is most of what is valid, and not most of the region.
+    columns = np.arange(160)
+    after = np.where(columns < 60, waves(1), np.where(columns < 90, waves(1, 3.0), waves(2)))
+    field = jacoflow.flow(*(np.clip(np.rint(frame), 0, 255).astype(np.uint8) for frame in (waves(1), after)))
+    found = field.measure("u", (0, 0, 140, 160))
+    assert found.status == "no_dominant_motion" and np.isnan(found.value), found
+    assert found.share > 0.6 and found.share * found.valid_share < 1 - found.valid_share, found
+    assert abs(field.measure("u", (0, 0, 60, 160)).value) < 0.05
+
+
 def test_regions_of_every_kind_agree(fan_field):
     y, x = np.mgrid[:SIZE, :SIZE]
     mask = (x >= 60) & (x < 100) & (y >= 60) & (y < 100)

@@ -60,6 +60,14 @@ def saved(request, tmp_path):
     return save
 
 
+@pytest.mark.parametrize("share", [0.02, 0.5, 0.9])
+def test_files_that_are_cut_off_are_damaged(saved, share):
+    path = saved(frames=STACK)
+    path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
+    with pytest.raises(jacoflow.FormatError, match=path.name):
+        list(io.frames(path))
+
+
 def test_the_only_stack_is_read(saved):
     path = saved(frames=STACK, rate=np.array(25.0))
     reader = io.frames(path)

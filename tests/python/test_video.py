@@ -154,6 +154,23 @@ def test_rotated_video_is_turned_everywhere(rotation, turn, tmp_path):
     assert shapes == {want[0].shape}
 
 
+@pytest.mark.parametrize(
+    ("reader", "codec", "name"),
+    [("io", "ffv1", "a.avi"), ("video", "ffv1", "a.avi"), ("io", "mjpeg", "a.avi"), ("program", "ffv1", "a.mkv")],
+)
+def test_a_video_that_is_cut_off_says_so(reader, codec, name, monkeypatch, tmp_path):
+    pictures = [np.random.default_rng(k).integers(0, 256, (HEIGHT, WIDTH)).astype(np.uint8) for k in range(6)]
+    path = encode(tmp_path / name, codec, "gray" if codec == "ffv1" else "yuvj420p", pictures, "gray")
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    if reader == "program":
+        ffmpeg = pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
+        (tmp_path / "ffmpeg").symlink_to(ffmpeg)
+        monkeypatch.setitem(sys.modules, "av", None)
+        monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(jacoflow.FormatError, match=rf"{name}: cut off"):
+        list(video.frames(path) if reader == "video" else io.frames(path, colour="luminance"))
+
+
 def test_times_of_a_variable_frame_rate(tmp_path):
     path = encode(tmp_path / "vfr.mkv", "ffv1", "gray", PICTURES, "gray", milliseconds=[0, 40, 100, 300])
     np.testing.assert_allclose([time for time, _ in io.frames(path).timed()], [0, 0.04, 0.1, 0.3])

@@ -12,9 +12,9 @@ use crate::frame_list::Frames;
 use crate::image::renamed;
 use crate::interrupt::interruptible;
 use arguments::{Arguments, estimator_options};
-use jacoflow::error::Error;
+use jacoflow::error::{Error, check_memory};
 use jacoflow::temporal::AnyFlowStream;
-use jacoflow::types::AnyField;
+use jacoflow::types::{AnyField, FlowField as Field};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
@@ -102,6 +102,17 @@ fn check_count(frames: &Frames<'_>, stream: &AnyFlowStream) -> Outcome<()> {
     Ok(())
 }
 
+/// What the motion and the covariance of a field take.
+fn bytes(field: &AnyField) -> usize {
+    fn planes<T>(field: &Field<T>) -> usize {
+        size_of_val(&field.motion[..]) + field.covariance.as_ref().map_or(0, |planes| size_of_val(&planes[..]))
+    }
+    match field {
+        AnyField::Single(field) => planes(field),
+        AnyField::Double(field) => planes(field),
+    }
+}
+
 /// The fields of a whole sequence.
 fn run(
     py: Python<'_>,
@@ -122,6 +133,9 @@ fn run(
         }
         progress.step(index + 1, frames.count)?;
         let Some(field) = field else { continue };
+        if matches!(fields, Growing::None) {
+            check_memory("frames", bytes(&field).checked_mul(frames.count))?;
+        }
         if ends == Ends::Missing {
             fields.fill(&field, field.frame_index())?;
         }

@@ -17,7 +17,8 @@ const FLOOR: f64 = 1e-14;
 /// Whether a region has the requested motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RegionStatus {
-    /// More than half of its valid sites follow one affine motion, or the site at the given point does.
+    /// More than half of its valid sites follow one affine motion, and more than those whose estimates the frames
+    /// contradict; or the site at the given point does.
     Ok,
     /// No motion is that of most sites, or the site at the given point differs from its neighbours.
     NoDominantMotion,
@@ -131,7 +132,10 @@ pub fn fit_region<T: Real>(
     let Some(dominant) = dominant_motion(&sites, wanted) else { return Ok(unknown) };
     let followers: Vec<usize> = sites.iter().filter(|site| dominant.holds(site)).map(|site| site.index).collect();
     let count = followers.len();
-    let is_found = wanted.map_or(2 * count > sites.len(), |wanted| dominant.holds(&sites[wanted]));
+    // Where the frames contradict the estimate there may be a motion that was not found.
+    let estimated = inside.iter().filter(|&&index| field.status[index].has_estimate()).count();
+    let is_dominant = 2 * count > sites.len() && count + sites.len() > estimated;
+    let is_found = wanted.map_or(is_dominant, |wanted| dominant.holds(&sites[wanted]));
     if !is_found {
         return Ok(RegionMotion { count, status: RegionStatus::NoDominantMotion, ..unknown });
     }

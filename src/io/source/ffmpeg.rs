@@ -188,11 +188,14 @@ impl Running {
     /// Waits for the program after its last frame; an error when it failed.
     fn finish(&mut self, path: &Path) -> Result<()> {
         let status = self.child.wait().map_err(|e| Error::io(path, e))?;
-        if status.success() {
-            return Ok(());
-        }
         let words = self.last_words();
-        Err(Error::format(path, format!("ffmpeg stopped with {status}: {words}")))
+        if !status.success() {
+            return Err(Error::format(path, format!("ffmpeg stopped with {status}: {words}")));
+        }
+        if words.contains("File ended prematurely") {
+            return Err(Error::format(path, format!("cut off: {words}")));
+        }
+        Ok(())
     }
 }
 
