@@ -1,5 +1,6 @@
 """`measure` of regions with two motions, of turning discs and of a noisy plane: how well values and standard
-deviations fit the truth, and the share of regions without a dominant motion."""
+deviations fit the truth, and the share of regions without a dominant motion, of these and of waves, whose motion
+is not affine."""
 
 from __future__ import annotations
 
@@ -21,7 +22,7 @@ MAX_LOSS = 50.0
 
 def rows() -> dict[str, list[float]]:
     """One value for each region."""
-    found: dict[str, list[float]] = {name: [] for name in ("two motions", "discs", "plane", "none found")}
+    found: dict[str, list[float]] = {name: [] for name in ("two motions", "discs", "plane", "none found", "waves, none found")}
     for seed in SEEDS:
         picture = steps.texture(seed)
         for difference in DIFFERENCES:
@@ -43,6 +44,9 @@ def rows() -> dict[str, list[float]]:
         for noise in NOISES:
             pair = [steps.moved(picture, np.eye(2)), steps.moved(picture, 1.01 * np.eye(2), (0.37, 0.0))]
             add(found, "plane", measured(seed, pair, noise, "divergence", SQUARE), 2 * np.log(1.01))
+        waves = jacoflow.scenes.Scene("waves", random_state=seed, speed=0.4, wavelength=256.0, width=steps.SIZE, height=steps.SIZE)
+        pair = [waves.frame(float(k)) for k in range(2)]
+        found["waves, none found"].append(float(measured(seed, pair, 0.5, "u", SQUARE).status != "ok"))
     return found
 
 
