@@ -1,7 +1,7 @@
 """Coarse-to-fine estimate between frames that are not equally bright, beside saturated pixels, over large motions, beside
 a motion boundary (of three frames too) and of undersampled texture: errors, px; share of errors above 1 px that neither
 status nor standard deviation states; change by saturated pixels, standard deviations; bias of pairs in noise, px; share
-of errors outside 95 % intervals; time on equal frames."""
+of errors outside 95 % intervals, of undersampled texture and of discs that smoothness holds back; time on equal frames."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 import jacoflow
 from benchmarks.scenes import disturbed as scenes
 from benchmarks.scenes import steps
+from benchmarks.tables.limits import eight_bit
 
 SEEDS = (41, 42, 43)
 """Of textures that no rule was chosen on."""
@@ -23,12 +24,14 @@ FRACTIONS = ((0.25, 0.3), (1.7, -0.35), (-0.6, 1.4))
 NOISY = (0.5, 1.5, 2.5)
 """Motions of noisy texture, px, and its noise, grey levels."""
 NOISE = 4.0
+RADIUS, ANGLES = 20.0, (0.02, 0.04)
+"""Of discs, px, and their turns, rad."""
 SHIFTS = ((56, 0), (0, -64), (80, 60))
 
 
 def rows() -> dict[str, list[float]]:
     """One value for each change and seed, each seed, each shift and seed."""
-    found: dict[str, list[float]] = {"equal": [], "changed": [], "specks": [], "shifts": [], "boundary": [], "three frames": [], "silent": [], "undersampled": [], "noise": [], "outside": [], "ms": []}
+    found: dict[str, list[float]] = {"equal": [], "changed": [], "specks": [], "shifts": [], "boundary": [], "three frames": [], "silent": [], "undersampled": [], "noise": [], "outside": [], "discs": [], "ms": []}
     for seed in SEEDS:
         begun = time.process_time()
         found["equal"].append(error(scenes.changed_pair(seed, (3.3, -1.4)), (3.3, -1.4)))
@@ -56,6 +59,8 @@ def rows() -> dict[str, list[float]]:
         std = scenes.inner(np.stack([field.std("u"), field.std("v")], axis=-1))
         found["undersampled"].append(float(np.sqrt(np.mean(off**2))))
         found["outside"].append(float(np.mean(off > 1.96 * std)))
+    for angle, seed in itertools.product(ANGLES, SPECKED):
+        found["discs"].append(disc(seed, angle))
     for shift, seed in itertools.product(NOISY, SEEDS):
         rng, picture = np.random.default_rng(seed), steps.texture(seed)
         pair = (steps.moved(picture, np.eye(2), (k * shift, 0.0)) for k in (0, 1))
@@ -66,6 +71,17 @@ def rows() -> dict[str, list[float]]:
         distance = np.linalg.norm(field.flow - np.array(shift), axis=-1)
         found["shifts"].append(float(np.median(distance[scenes.FOUND])))
     return found
+
+
+def disc(seed: int, angle: float) -> float:
+    """Share of the pixels of a disc before a still wall whose 95 % intervals of u miss its motion, a turn."""
+    picture, wall = steps.texture(seed), steps.moved(steps.texture(seed + 100), np.eye(2))
+    y, x = (axis - centre for axis, centre in zip(np.mgrid[: steps.SIZE, : steps.SIZE], steps.CENTRE[::-1], strict=True))
+    moved = [np.where(np.hypot(x, y) < RADIUS, steps.moved(picture, steps.turn(k * angle)), wall) for k in (0, 1)]
+    rng = np.random.default_rng(seed)
+    field = jacoflow.flow(*(eight_bit(frame, 1.0, rng) for frame in moved), threads=1)
+    inside = np.hypot(x, y) < RADIUS - 4
+    return float(np.mean(np.abs(field.u + np.sin(angle) * y - (np.cos(angle) - 1) * x)[inside] > 1.96 * field.std("u")[inside]))
 
 
 def error(frames: list[scenes.Array], move: tuple[float, float]) -> float:
