@@ -96,7 +96,7 @@ fn arrays_that_do_not_fit_are_refused() {
     npz.array("motion", &[MOTION_NAMES.len(), field.width, field.height], &field.motion).unwrap();
     let mut npz = NpzReader::new(npz.into_inner().unwrap(), "x").unwrap();
     let message = read_npz_from::<f32, _>(&mut npz).unwrap_err().to_string();
-    let expected = format!("[{}, {}, {}]", MOTION_NAMES.len(), field.height, field.width);
+    let expected = format!("({}, {}, {})", MOTION_NAMES.len(), field.height, field.width);
     assert!(message.contains("'motion'") && message.contains(&expected), "{message}");
     let mut npz = NpzWriter::new(Cursor::new(Vec::new()), "x");
     npz.text("metadata", "{}").unwrap();

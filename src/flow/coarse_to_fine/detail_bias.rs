@@ -127,8 +127,8 @@ impl DetailBias {
         });
     }
 
-    /// Mean square around a node of what the frames leave of the flow, and the share of it that white noise of a
-    /// density `xx, xy, yy`, px^4, does not explain.
+    /// Mean square around a node of what the frames leave of the flow, and the share of it that white noise
+    /// of a density `xx, xy, yy`, px^4, does not explain.
     pub fn remainder(&self, node: usize, density: &Square) -> (Square, f64) {
         let [xx, xy, yy] = self.remainder[node];
         let noise = (density[0] + density[2]) / (4.0 * PI * WINDOWS[0].powi(2));

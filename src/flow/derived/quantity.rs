@@ -113,7 +113,8 @@ impl Quantity {
         }
     }
 
-    /// What is expected where `name` is no quantity: a suggestion, `others` that are known there, all quantities.
+    /// What is expected where `name` is no quantity: a suggestion, `others` that are known there, all
+    /// quantities.
     pub fn expected(name: &str, others: &[&str]) -> String {
         let names: Vec<&str> = others.iter().copied().chain(Self::ALL.iter().map(|q| q.name())).collect();
         let suggestion = Self::suggestion(name).map(|meant| format!("a name (did you mean {:?}?), ", meant.name()));

@@ -76,8 +76,8 @@ const DETAIL_SHARES: [f64; 3] = [4.7, 0.0235, 0.0235];
 const COARSE_DETAIL_SHARE: f64 = 0.2;
 const NOISE_IN_DETAIL: f64 = 0.4;
 
-/// Variance of the flow over the mean square of the remainder that noise does not explain: one step in windows
-/// recovers a part of the error.
+/// Variance of the flow over the mean square of the remainder that noise does not explain: one step in
+/// windows recovers a part of the error.
 const REMAINDER_SHARE: f64 = 2.0;
 
 /// Minimum nodes of a parallel task.
