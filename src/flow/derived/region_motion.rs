@@ -17,8 +17,8 @@ const FLOOR: f64 = 1e-14;
 /// Whether a region has the requested motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RegionStatus {
-    /// More than half of its valid sites follow one affine motion, and more than those whose estimates the frames
-    /// contradict; or the site at the given point does.
+    /// More than half of its valid sites follow one affine motion, and more than those whose estimates the
+    /// frames contradict; or the site at the given point does.
     Ok,
     /// No motion is that of most sites, or the site at the given point differs from its neighbours.
     NoDominantMotion,
