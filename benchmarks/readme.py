@@ -64,6 +64,7 @@ RECORDED_MATCHERS = {
     "OpenCV BM 15": "OpenCV BM",
 }
 LIMITS = "Limits of a step"
+WAVES = "Turning waves"
 TWO_MOTIONS = "Two motions in a region"
 NOISE = "Noise of a pair"
 DISCS = "Turning discs"
@@ -123,6 +124,13 @@ def limits(record: Record) -> list[str]:
     names |= {rival: rival for rival in ("OpenCV DIS medium", "OpenCV Farneback")}
     body = [[str(row["step"]), *(number(row.get(name), 3) for name in names)] for row in record.sections[LIMITS]]
     return lines(["median error, px", *names.values()], body)
+
+
+def turning_waves(record: Record) -> list[str]:
+    """Shares of valid and of silent sites of a texture without fine detail, by the turn."""
+    names = ("pair, valid", "pair, silent", "triple, valid", "triple, silent")
+    body = [[number(row["turn, degrees"], 0), *(number(row.get(name), 3) for name in names)] for row in record.sections[WAVES]]
+    return lines(["turn, degrees", *names], body)
 
 
 def two_motions(record: Record) -> list[str]:
@@ -299,6 +307,7 @@ TABLES: dict[str, tuple[Callable[[Record], list[str]], tuple[str, ...]]] = {
     "stereo_tracking": (stereo_tracking, tuple(f"Stereo tracking, {scene}" for scene in STEREO_SCENES)),
     "motion": (motion, (CHANCE, VIEWS)),
     "limits": (limits, (LIMITS,)),
+    "turning_waves": (turning_waves, (WAVES,)),
     "two_motions": (two_motions, (TWO_MOTIONS,)),
     "turning_discs": (turning_discs, (DISCS,)),
     "noise": (noise, (NOISE,)),

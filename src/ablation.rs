@@ -143,6 +143,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("gradient.with_camera", "the target may move with the camera"),
     ("measure.common_residual", "what residuals have in common over parts of a region widens its covariance"),
     ("measure.jacobian_change", "what Jacobians would change in the motion of a region widens its covariance"),
+    ("measure.contradicted", "a motion has more sites than those whose estimates the frames contradict"),
     ("measure.scatter", "sites of one motion may differ beyond their covariances"),
     ("windowed.noise_dominated", "the covariance is inflated along directions that only noise determines"),
 ];

@@ -19,6 +19,19 @@ def texture(seed: int) -> Array:
     return np.asarray(20 + 200 * (noise - noise.min()) / np.ptp(noise))
 
 
+def waves(seed: int) -> Array:
+    """A sum of 60 waves of 5 to 30 px in random directions about 128, standard deviation 25 grey levels, twice as
+    large as a frame: texture without fine detail."""
+    rng, (y, x) = np.random.default_rng(seed), np.mgrid[: 2 * SIZE, : 2 * SIZE]
+    directions = rng.normal(size=(60, 2))
+    lengths = np.exp(rng.uniform(np.log(5), np.log(30), (60, 1)))
+    directions *= 2 * np.pi / lengths / np.linalg.norm(directions, axis=1, keepdims=True)
+    total = np.zeros(x.shape)
+    for a, b in directions:
+        total += np.sin(a * x + b * y + rng.uniform(0, 2 * np.pi))
+    return np.asarray(128 + 25 * total / total.std())
+
+
 def moved(picture: Array, matrix: ArrayLike, shift: tuple[float, float] = (0.0, 0.0)) -> Array:
     """The middle of `picture` after the points at p go to M (p - c) + c + shift."""
     y, x = np.mgrid[:SIZE, :SIZE].astype(float)

@@ -65,6 +65,28 @@ def limits(seeds: tuple[int, ...]) -> list[Row]:
     return rows
 
 
+def turning_waves(seeds: tuple[int, ...]) -> list[Row]:
+    """Turns of a texture without fine detail under a grey level of noise: shares of the sites inside the frame that
+    are `valid`, and of silent ones, as in `limits`."""
+    rows: list[Row] = []
+    inside = (slice(MARGIN, -MARGIN),) * 2
+    for degrees in TURNS[:3]:
+        matrix = steps.turn(np.radians(degrees))
+        truth = steps.flow(matrix)[inside]
+        found: dict[str, list[float]] = {}
+        for seed in seeds:
+            picture, rng = steps.waves(seed), np.random.default_rng(seed)
+            frames = [eight_bit(steps.moved(picture, np.linalg.matrix_power(matrix, k)), 1.0, rng) for k in (-1, 0, 1)]
+            for what, field in (("pair", jacoflow.flow(*frames[1:])), ("triple", jacoflow.flow(*frames))):
+                error = np.linalg.norm(field.flow[inside] - truth, axis=-1)
+                std = np.hypot(field.std("u"), field.std("v"))[inside]
+                is_silent = field.valid[inside] & (error > 1) & (error > 5 * std)
+                found.setdefault(f"{what}, valid", []).append(float(field.valid[inside].mean()))
+                found.setdefault(f"{what}, silent", []).append(float(is_silent.mean()))
+        rows.append({"turn, degrees": degrees} | {name: float(np.mean(values)) for name, values in found.items()})
+    return rows
+
+
 def eight_bit(frame: NDArray[np.float64], noise: float, rng: np.random.Generator) -> NDArray[np.uint8]:
     """A frame as a camera gives it, with white noise of `noise` grey levels."""
     return np.asarray(np.clip(np.rint(frame + rng.normal(0, noise, frame.shape)), 0, 255), dtype=np.uint8)
@@ -142,6 +164,7 @@ def _rms(values: list[float]) -> float:
 
 TABLES = {
     "limits": report.Table("Limits of a step", lambda o: limits(SEEDS[: 1 if o.quick else len(SEEDS)])),
+    "turning_waves": report.Table("Turning waves", lambda o: turning_waves(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "two_motions": report.Table("Two motions in a region", lambda o: two_motions(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "turning_discs": report.Table("Turning discs", lambda o: turning_discs(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "noise": report.Table("Noise of a pair", lambda o: noise(SEEDS[: 1 if o.quick else len(SEEDS)])),

@@ -47,7 +47,7 @@ def frames(
     MissingDependencyError
         PyAV is not installed.
     FormatError
-        The file is no video that can be decoded.
+        The file is no video that can be decoded, or is cut off.
     """
     # Checked here and not at the first frame, so that mistakes show where they are made.
     video = Video(path, start=start, stop=stop, step=step, grey=grey)

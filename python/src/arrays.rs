@@ -1,6 +1,6 @@
 //! numpy arrays in, core frames out, and back. Messages name the argument, what it was and what is accepted.
 
-use super::samples::{exact_samples, is_masked, refuse_other};
+use super::samples::{exact_samples, is_masked, refuse_non_array};
 use crate::errors::{Outcome, Raised};
 use jacoflow::buffer_pool;
 use jacoflow::error::{Error, check_memory, shape_text};
@@ -104,13 +104,13 @@ impl ColourRule {
 
 /// One frame `(H, W)`, or `(H, W, 3 or 4)` where colour is allowed.
 pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
-    refuse_other(argument, object)?;
+    refuse_non_array(argument, object)?;
     converted(argument, as_array(argument, object)?, colour)
 }
 
 /// As [`frame`], of masked arrays too: their masked pixels are NaN, which no estimate uses.
 pub fn frame_with_gaps(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
-    refuse_other(argument, object)?;
+    refuse_non_array(argument, object)?;
     converted(argument, native(object)?, colour)
 }
 
@@ -121,7 +121,7 @@ pub fn tracked_frame(
     colour: ColourRule,
     levels: GreyLevels,
 ) -> Outcome<AnyFrame> {
-    refuse_other(argument, object)?;
+    refuse_non_array(argument, object)?;
     converted(argument, unmasked(object, levels)?, colour)
 }
 

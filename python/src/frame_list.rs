@@ -1,7 +1,7 @@
 //! A sequence of frames as Python gives it: a stack, a list, an iterator, or a reader of a file.
 
 use super::arrays::{ColourRule, frame_with_gaps, native};
-use super::samples::refuse_other;
+use super::samples::refuse_non_array;
 use crate::errors::Outcome;
 use jacoflow::error::shape_text;
 use jacoflow::types::AnyFrame;
@@ -61,7 +61,7 @@ impl<'py> Frames<'py> {
         if is_sequence {
             return Ok(Self::of(object.clone(), object.len()?, colour));
         }
-        refuse_other("frames", object)?;
+        refuse_non_array("frames", object)?;
         let reader = object.py().import("jacoflow._readers")?.getattr("FrameReader")?;
         if object.is_instance(&reader)? {
             let (list, noted) = Noted::read(object)?;

@@ -55,7 +55,7 @@ fn expect_exact(argument: &str, array: &Bound<'_, PyUntypedArray>, masked: bool)
 }
 
 /// Refuses what is no array: the name of a file, None, a dictionary.
-pub fn refuse_other(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<()> {
+pub fn refuse_non_array(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<()> {
     if object.is_instance_of::<PyString>() || object.hasattr("__fspath__")? {
         return Err(PyTypeError::new_err(format!(
             "{argument}: expected an array, got the name of a file ({}); open it with jacoflow.io.frames(path)",

@@ -20,7 +20,8 @@ use std::path::{Path, PathBuf};
 #[command(
     after_help = "Rows: frame, time_s, x, y, quantity, value, std, unit, share, valid_share, status. For a region (default: the whole frame) one affine\n\
     motion is fitted to the valid estimates that follow it, a share of them; the status is no_dominant_motion and the value NaN where\n\
-    that is half of them or less, or less than the frames contradict. std knows of their errors, their overlap and their scatter. With --points every point has its rows.\n\
+    that is half of them or less, or less than the frames contradict. std knows of their errors, their overlap and their scatter.\n\
+    With --points every point has its rows.\n\
     Rates are per second where the frame rate is known (--fps, or the file), else per frame; rpm needs it.\n\n\
     Quantities: u, v, u_x, v_x, u_y, v_y, divergence, curl, shear_magnitude, shear_axis, strain_xx, strain_xy, strain_yy, angular_velocity, rpm,\n\
     rotation_centre_x, rotation_centre_y, centre_distance, time_to_contact, speed (u and v of a region: at its centre, or --at)\n\n\

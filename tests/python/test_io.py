@@ -126,6 +126,12 @@ def test_animated_png_is_no_picture(frames, tmp_path):
         io.read_image(tmp_path / "a.png")
 
 
+def test_a_field_of_negative_width_is_named(tmp_path):
+    (tmp_path / "a.flo").write_bytes(np.float32(202021.25).tobytes() + np.array([-5, 7], "<i4").tobytes())
+    with pytest.raises(jacoflow.FormatError, match="a field of -5 x 7 px"):
+        io.read_flo(tmp_path / "a.flo")
+
+
 @pytest.mark.parametrize("name", ["a.npy", "a.y4m", "a"])
 def test_no_frames_make_no_file(name, tmp_path):
     with pytest.raises(ValueError, match=r"^frames: expected at least one frame \(H, W\), got none"):

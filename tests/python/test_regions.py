@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 import jacoflow
-from benchmarks.scenes.steps import CENTRE, SIZE, moved, texture, turn
+from benchmarks.scenes.steps import CENTRE, SIZE, moved, texture, turn, waves
 
 DISC = (*CENTRE, 45.0)
 PICTURE = texture(0)
@@ -124,20 +124,12 @@ def test_where_the_frames_contradict_most_estimates_nothing_is_said():
     assert np.isnan(field.region_mean("u")[0]) and field.measure("u").status == "too_few_sites"
 
 
-def waves(seed, shift=0.0):
-    """Texture of waves of 6 to 20 px that has moved by `shift` px along x."""
-    rng, (y, x) = np.random.default_rng(seed), np.mgrid[:160, :160]
-    directions = rng.normal(size=(40, 2))
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True) / (2 * np.pi / rng.uniform(6, 20, (40, 1)))
-    sum_of_waves = sum(np.sin(a * (x - shift) + b * y + rng.uniform(0, 6.3)) for a, b in directions)
-    return 128 + 25 * sum_of_waves / sum_of_waves.std()
-
-
 def test_what_the_frames_contradict_does_not_make_the_rest_dominant():
     # Still, moving, and unrelated: the still part is most of what is valid, and not most of the region.
-    columns = np.arange(160)
-    after = np.where(columns < 60, waves(1), np.where(columns < 90, waves(1, 3.0), waves(2)))
-    field = jacoflow.flow(*(np.clip(np.rint(frame), 0, 255).astype(np.uint8) for frame in (waves(1), after)))
+    columns = np.arange(SIZE)
+    still, gone = (moved(waves(1), np.eye(2), (shift, 0.0)) for shift in (0.0, 3.0))
+    after = np.where(columns < 60, still, np.where(columns < 90, gone, moved(waves(2), np.eye(2))))
+    field = jacoflow.flow(*(np.clip(np.rint(frame), 0, 255).astype(np.uint8) for frame in (still, after)))
     found = field.measure("u", (0, 0, 140, 160))
     assert found.status == "no_dominant_motion" and np.isnan(found.value), found
     assert found.share > 0.6 and found.share * found.valid_share < 1 - found.valid_share, found

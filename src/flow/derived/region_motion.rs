@@ -134,7 +134,8 @@ pub fn fit_region<T: Real>(
     let count = followers.len();
     // Where the frames contradict the estimate there may be a motion that was not found.
     let estimated = inside.iter().filter(|&&index| field.status[index].has_estimate()).count();
-    let is_dominant = 2 * count > sites.len() && count + sites.len() > estimated;
+    let contradicted = if keeps("measure.contradicted") { estimated - sites.len() } else { 0 };
+    let is_dominant = 2 * count > sites.len() && count > contradicted;
     let is_found = wanted.map_or(is_dominant, |wanted| dominant.holds(&sites[wanted]));
     if !is_found {
         return Ok(RegionMotion { count, status: RegionStatus::NoDominantMotion, ..unknown });
