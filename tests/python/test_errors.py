@@ -163,6 +163,14 @@ def test_flat_frames_are_no_error():
             assert (field.status[20:-20, 20:-20] == jacoflow.Status.UNOBSERVABLE).all()
 
 
+def test_a_frame_without_samples_is_named_in_its_neighbours():
+    """Not as if there were no texture."""
+    frames = scenes.Scene("affine", width=64, height=48).frames(3)
+    frames[1] = np.nan
+    for field in (jacoflow.flow(*frames[:2]), jacoflow.flow(*frames[1:]), jacoflow.flow(*frames)):
+        assert (field.status == jacoflow.Status.NON_FINITE).all() and not field.valid.any()
+
+
 def test_sixteen_bit_extremes_do_not_overflow():
     frames = np.clip(scenes.Scene("affine", width=48, height=48).frames(3) / 255, 0, 1)
     wide = np.round(frames * 65535).astype(np.uint16)

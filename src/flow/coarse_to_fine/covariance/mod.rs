@@ -78,7 +78,7 @@ const NOISE_IN_DETAIL: f64 = 0.4;
 
 /// Variance of the flow over the mean square of the remainder that noise does not explain: one step in
 /// windows recovers a part of the error.
-const REMAINDER_SHARE: f64 = 2.0;
+const REMAINDER_SHARE: f64 = 1.25;
 
 /// Minimum nodes of a parallel task.
 const NODES_PER_TASK: usize = 1024;

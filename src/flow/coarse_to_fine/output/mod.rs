@@ -70,7 +70,7 @@ pub(super) fn fill<T: SimdReal>(
         pixels: pixels.as_ref(),
         reference: frames[frames.len() - 2],
         mask: common.mask.as_ref(),
-        observable: is_observable(estimate),
+        of_all: status_of_all(estimate, frames),
         consistency: Consistency::of(estimate),
         spreads,
         statistics: estimate.statistics.as_ref(),
@@ -105,10 +105,15 @@ fn at_full_resolution<T: SimdReal>(
     motion
 }
 
-/// Whether there is any contrast: a constant image determines no motion.
-fn is_observable<T: SimdReal>(estimate: &Estimate<T>) -> bool {
+/// Status of every pixel, if frames say nothing: one without finite samples, or a constant image.
+fn status_of_all<T: SimdReal>(estimate: &Estimate<T>, frames: &[&Frame<T>]) -> Option<Status> {
     let (data, threshold) = (&estimate.data, 1e-9 * estimate.brightness.contrast.powi(2));
-    (0..data.height).any(|y| data.line(UU, y).iter().chain(data.line(VV, y)).any(|v| v.to_f64() > threshold))
+    let mut information = (0..data.height).flat_map(|y| data.line(UU, y).iter().chain(data.line(VV, y)));
+    if information.any(|v| v.to_f64() > threshold) {
+        return None;
+    }
+    let has_finite = |frame: &&Frame<T>| (0..frame.height()).any(|y| frame.row(y).iter().any(|value| value.finite()));
+    Some(if frames.iter().all(has_finite) { Status::Unobservable } else { Status::NonFinite })
 }
 
 struct Writer<'a, T: Clone> {
@@ -123,7 +128,8 @@ struct Writer<'a, T: Clone> {
     pixels: Option<&'a PixelMotion<T>>,
     reference: &'a Frame<T>,
     mask: Option<&'a Mask>,
-    observable: bool,
+    /// Status of every pixel that is neither masked nor itself not finite, if it is the same.
+    of_all: Option<Status>,
     consistency: Consistency,
     spreads: Option<CovarianceMaps<T>>,
     statistics: Option<&'a WindowStatistics<T>>,
@@ -190,7 +196,7 @@ impl<T: SimdReal> Writer<'_, T> {
         // Without a short circuit, so that the compiler uses lanes.
         let finite = || self.reference.row(y).iter().fold(true, |so_far, value| so_far & value.finite());
         let agrees = !self.consistency.has_contradiction(y / self.pitch);
-        bare && agrees && self.observable && self.mask.is_none() && finite()
+        bare && agrees && self.of_all.is_none() && self.mask.is_none() && finite()
     }
 
     /// Residual, rank and condition number of the equations at the nearest site, if requested.
@@ -229,8 +235,8 @@ impl<T: SimdReal> Writer<'_, T> {
             Status::Masked
         } else if !self.reference.get(x, y).finite() {
             Status::NonFinite
-        } else if !self.observable {
-            Status::Unobservable
+        } else if let Some(status) = self.of_all {
+            status
         } else if self.consistency.is_contradicted(x / self.pitch, y / self.pitch) {
             Status::Inconsistent
         } else {
