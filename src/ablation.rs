@@ -29,6 +29,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("flow.boundary_error", "jumps of the motion nearby widen the covariance"),
     ("flow.detail_bias", "motion that the finest detail of the frames contradicts over wide windows is moved"),
     ("flow.detail_scatter", "differences with and without the finest detail widen the covariance"),
+    ("flow.step", "the flow moves by what smoothed frames leave of it in narrow windows beyond chance"),
     ("flow.remainder", "what the frames leave of the flow in narrow windows widens its covariance"),
     ("flow.block_matches", "blocks are searched for on a coarse level"),
     ("flow.coarse_peak_locking", "peak locking is removed on every level before its motion is carried down"),

@@ -114,8 +114,10 @@ def test_intervals_of_the_coarse_to_fine_estimate_hold_the_truth(carrier, frames
 
 
 def test_intervals_of_a_small_disc_hold_its_motion():
-    """Smoothness holds back a disc of 20 px that turns by .02 rad; half of the intervals of u missed that."""
-    assert np.mean([disc(seed, 0.02) for seed in range(61, 65)]) < 0.25
+    """Smoothness holds back a disc of 20 px that turns by .02 rad: by half of its motion without the step beyond
+    chance, and half of the intervals of u missed that."""
+    missed, relative = np.mean([disc(seed, 0.02) for seed in range(61, 65)], axis=0)
+    assert missed < 0.05 and relative < 0.35
 
 
 @pytest.mark.parametrize("frames", [2, 3])

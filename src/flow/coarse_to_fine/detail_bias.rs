@@ -8,17 +8,19 @@
 //! around a node measures errors that residuals do not show, as the scatter of half samples does (P. C.
 //! Mahalanobis's interpenetrating samples, 1946); the covariance includes it.
 //!
-//! What the frames as they are leave of the motion in narrow windows, without smoothness, is the step that
-//! Lucas and Kanade would take from it. Where it is longer than noise explains, smoothness holds the motion
-//! back (small or curved objects); the covariance includes its mean square, too.
+//! What either leaves of the motion in narrow windows, without smoothness, is the step that Lucas and Kanade
+//! would take from it. Where it is longer than noise explains, smoothness holds the motion back (small or
+//! curved objects). The motion moves by the step of the smoothed frames beyond that, since the finest detail
+//! may be biased; the covariance includes the mean square of the step of the frames as they are.
 
 use super::data_term::{COUNT, DataOptions, DataTerm, ERROR, MOTION, normal, right};
 use super::descent::DescentPlan;
 use super::nodes::{NodeAxis, binomial_mean, sites_around};
-use super::planes::{LEFT, Planes};
+use super::planes::{LEFT, Planes, SITE_SPACING};
 use super::pyramid::ComparedFrames;
 use super::refine::SITES_PER_NODE;
 use super::workspace::Workspace;
+use crate::ablation::keeps;
 use crate::image::Spline;
 use crate::math::median;
 use crate::simd::SimdReal;
@@ -33,10 +35,18 @@ const WINDOWS: [f64; 3] = [3.4, 8.7, 14.3];
 const PRIOR: f64 = 0.5;
 /// Maximum difference at a node, px: larger ones are of two motions.
 const MAX_DIFFERENCE: f64 = 0.1;
-/// Mean square of a remainder, over that of white noise, that is taken for chance.
-const CHANCE: f64 = 2.0;
-/// Maximum remainder at a node, px.
+/// Maximum components of what is left at a node, px.
 const MAX_REMAINDER: f64 = 1.0;
+/// The same, where the motion moves by it: larger ones are of two motions.
+const MAX_STEP: f64 = 0.3;
+/// Mean square of the steps, over that of white noise of the smoothed frames' residuals, which keep a quarter
+/// of the energy, and over the scatter in the narrow window, that is taken for chance.
+const NOISE_IN_STEP: f64 = 3.0;
+const SCATTER_IN_STEP: f64 = 0.5;
+/// Mean square of a remainder, over that of white noise, that is taken for chance; binomial means of it
+/// before they are compared.
+const NOISE_IN_REMAINDER: f64 = 1.2;
+const REMAINDER_MEANS: usize = 6;
 /// Bias, px, of which half is removed, and the same as a share of the scatter in the narrow window.
 const DOUBTFUL_BIAS: f64 = 0.02;
 const DOUBTFUL_SHARE: f64 = 0.1;
@@ -53,12 +63,14 @@ type Square = [f64; 3];
 #[derive(Debug)]
 pub(super) struct DetailBias {
     axes: (NodeAxis, NodeAxis),
-    /// Bias of the flow, px, with the opposite sign.
+    /// What the flow moves by, px: its bias with the opposite sign, and the step beyond chance.
     correction: Vec<[f64; 2]>,
     /// Mean squared differences around the nodes, px^2, in each of the windows.
     scatter: [Vec<Square>; 3],
-    /// Mean squares around the nodes of what the frames leave of the flow in the narrow window, px^2.
+    /// Mean squares around the nodes of what the frames leave of the flow in the narrow window, px^2; and
+    /// their sums over both directions in wide surroundings.
     remainder: Vec<Square>,
+    wide_remainder: Vec<[f64; 1]>,
 }
 
 impl DetailBias {
@@ -85,6 +97,11 @@ impl DetailBias {
         smoothed.into_iter().map(Spline::into_memory).for_each(|memory| space.keep(Planes::of_samples(memory)));
         space.keep(data);
         let remainder = mean_squares(&remainders(&sums[0]), MAX_REMAINDER, size);
+        let mut wide_remainder: Vec<[f64; 1]> = remainder.iter().map(|[xx, _, yy]| [xx + yy]).collect();
+        for _ in 0..REMAINDER_MEANS {
+            binomial_mean(&mut wide_remainder, size);
+        }
+        let narrow = sums[1].clone();
         let mut differences = Vec::new();
         let mut done = 0;
         let scatter = MEANS.map(|means| {
@@ -102,11 +119,15 @@ impl DetailBias {
             let kept = square / (square + DOUBTFUL_SHARE * (xx + yy) + 2.0 * DOUBTFUL_BIAS.powi(2));
             [kept * u, kept * v]
         };
-        let correction = differences.iter().zip(&scatter[0]).map(shrunk).collect();
-        Self { axes, correction, scatter, remainder }
+        let mut correction: Vec<[f64; 2]> = differences.iter().zip(&scatter[0]).map(shrunk).collect();
+        if keeps("flow.step") {
+            let steps = steps(&narrow, &scatter[0], size);
+            correction.iter_mut().zip(&steps).for_each(|(flow, step)| (0..2).for_each(|c| flow[c] += step[c]));
+        }
+        Self { axes, correction, scatter, remainder, wide_remainder }
     }
 
-    /// Removes the bias from the motion.
+    /// Removes the bias from the motion and takes the step.
     pub fn correct<T: SimdReal>(&self, motion: &mut Planes<T>) {
         let len = motion.row_len();
         let (width, stride) = (motion.width, motion.stride());
@@ -131,8 +152,8 @@ impl DetailBias {
     /// of a density `xx, xy, yy`, px^4, does not explain.
     pub fn remainder(&self, node: usize, density: &Square) -> (Square, f64) {
         let [xx, xy, yy] = self.remainder[node];
-        let noise = (density[0] + density[2]) / (4.0 * PI * WINDOWS[0].powi(2));
-        ([xx, xy, yy], (1.0 - CHANCE * noise / (xx + yy)).max(0.0))
+        let noise = noise_variance(density[0] + density[2]);
+        ([xx, xy, yy], (1.0 - NOISE_IN_REMAINDER * noise / self.wide_remainder[node][0]).max(0.0))
     }
 
     /// Mean squared difference around a node in a window of `sigma` px.
@@ -168,14 +189,23 @@ fn node_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, size: (usize, us
     (0..size.0 * size.1).into_par_iter().map(nodes).collect()
 }
 
-/// Normal equations of the sites of a row for the flow that their motion leaves.
+/// Normal equations of the sites of a row for the flow that their motion, with its curvature, leaves.
 fn site_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, y: usize) -> Vec<NodeSums> {
-    let known: [&[T]; MOTION] = std::array::from_fn(|k| motion.line(k, y));
+    let lines: [&[T]; MOTION] = std::array::from_fn(|k| motion.line(k, y));
     let normals = [0, 1].map(|c| std::array::from_fn::<_, MOTION, _>(|k| data.line(normal(c, k), y)));
     let [right_u, right_v, errors] = [right(0), right(1), ERROR].map(|k| data.line(k, y));
+    let [above, below] = [y.saturating_sub(1), (y + 1).min(data.height - 1)].map(|y| [4, 5].map(|k| motion.line(k, y)));
+    // The mean of curved flow over a site's window, less the flow at the site, per change of the slopes.
+    let window = 0.5 * DataOptions::default().sigma.powi(2) / (2.0 * SITE_SPACING);
     let site = |x: usize| {
+        let (before, after) = (x.saturating_sub(1), (x + 1).min(data.width - 1));
+        let mut known: [f64; MOTION] = std::array::from_fn(|k| lines[k][x].to_f64());
+        for c in 0..2 {
+            let change = lines[2 + c][after] - lines[2 + c][before] + below[c][x] - above[c][x];
+            known[c] += window * change.to_f64();
+        }
         let left = |c: usize, right: &[T]| {
-            right[x].to_f64() - (0..MOTION).map(|k| normals[c][k][x].to_f64() * known[k][x].to_f64()).sum::<f64>()
+            right[x].to_f64() - (0..MOTION).map(|k| normals[c][k][x].to_f64() * known[k]).sum::<f64>()
         };
         let [a, b, c] = [normals[0][0], normals[0][1], normals[1][1]].map(|line| line[x].to_f64());
         [a, b, c, left(0, right_u), left(1, right_v), errors[x].to_f64()]
@@ -211,6 +241,29 @@ fn typical_energy(sums: &[NodeSums]) -> f64 {
 fn remainders(sums: &[NodeSums]) -> Vec<[f64; 2]> {
     let prior = 2.0 * PRIOR * typical_energy(sums);
     sums.iter().map(|sum| solve(sum, prior)).collect()
+}
+
+/// Steps of the flow beyond chance, px, from the sums of the smoothed frames and the `scatter` by the finest
+/// detail, of which they have a part.
+fn steps(sums: &[NodeSums], scatter: &[Square], size: (usize, usize)) -> Vec<[f64; 2]> {
+    let mut steps = remainders(sums);
+    let squares = mean_squares(&steps, MAX_STEP, size);
+    for (n, step) in steps.iter_mut().enumerate() {
+        let [a, b, c, _, _, energy] = sums[n];
+        let determinant = a * c - b * b;
+        let density = if determinant > 0.0 { energy * (a + c) / determinant } else { f64::INFINITY };
+        let chance = NOISE_IN_STEP * noise_variance(density)
+            + SCATTER_IN_STEP * (scatter[n][0] + scatter[n][2])
+            + 2.0 * DOUBTFUL_BIAS.powi(2);
+        let share = (1.0 - chance / (squares[n][0] + squares[n][2])).max(0.0);
+        *step = step.map(|d| share * d.clamp(-MAX_STEP, MAX_STEP));
+    }
+    steps
+}
+
+/// Variance, px^2, that white noise of a density, px^4, leaves in the narrow window.
+fn noise_variance(density: f64) -> f64 {
+    density / (4.0 * PI * WINDOWS[0].powi(2))
 }
 
 /// What the second sums say of the flow beyond the first, px.

@@ -46,7 +46,7 @@ use rayon::prelude::*;
 
 /// Variance of the flow over that of white noise of the density seen between windows, for two and for three
 /// frames: real noise is not white, and strongest where windows do not remove it.
-const FLOW_NOISE_FACTOR: [f64; 2] = [1.15, 1.35];
+const FLOW_NOISE_FACTOR: [f64; 2] = [1.15, 1.25];
 /// The same for the slopes.
 const SLOPE_NOISE_FACTOR: f64 = 0.42;
 /// Errors over the loss of curved motion, of the flow and of the slopes; for two and for three frames.
