@@ -120,10 +120,15 @@ fn result_info(path: &Path) -> Option<Result<Value>> {
             let planes = names.iter().zip(&map.planes).map(|(name, plane)| (*name, &plane[..]));
             planes_info(path, "pfm", (map.width, map.height), planes)
         })),
-        "npz" => Some(npz_info(path)),
+        "npz" if !is_foreign(path) => Some(npz_info(path)),
         "png" if is_kitti(path) => Some(read_kitti(path).map(|flow| flow_image_info(path, "kitti", &flow))),
         _ => None,
     }
+}
+
+/// An archive of arrays that holds neither a field nor a filter.
+fn is_foreign(path: &Path) -> bool {
+    NpzReader::open(path).is_ok_and(|archive| !archive.contains("metadata") && !archive.contains("header"))
 }
 
 /// KITTI flow is the only 16-bit RGB picture among ours.
