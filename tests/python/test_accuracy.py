@@ -62,6 +62,17 @@ def test_two_frames_are_limited_by_noise():
     assert FARNEBACK[case][0] / efficient < 4.0 and ours.errors(case)[0] < 1.2 * efficient
 
 
+def test_smooth_curvature_is_not_taken_for_a_step():
+    """Waves of 2 px over 40 px: a site's own window holds curved flow. Taken for what smoothness holds back, it leaves
+    .010 px on these seeds, .007 without."""
+    squares = []
+    for seed in (11, 12):
+        scene = jacoflow.scenes.Scene("waves", width=160, height=144, carrier="noise", random_state=seed, speed=2.0, wavelength=40.0)
+        off = jacoflow.flow(scene.frame(0.0), scene.frame(1.0)).flow - scene.truth(0.0, between=(0.0, 1.0)).flow
+        squares.append(np.mean(off[16:-16, 16:-16] ** 2))
+    assert np.mean(squares) < 0.008**2
+
+
 @pytest.mark.parametrize("size", [(120, 160), (160, 200)])
 def test_small_frames_find_motion_of_a_tenth_of_their_side(size):
     """Texture of 2 px shifted by sixteen."""
