@@ -8,10 +8,10 @@
 //! around a node measures errors that residuals do not show, as the scatter of half samples does (P. C.
 //! Mahalanobis's interpenetrating samples, 1946); the covariance includes it.
 //!
-//! What either leaves of the motion in narrow windows, without smoothness, is the step that Lucas and Kanade
-//! would take from it. Where it is longer than noise explains, smoothness holds the motion back (small or
-//! curved objects). The motion moves by the step of the smoothed frames beyond that, since the finest detail
-//! may be biased; the covariance includes the mean square of the step of the frames as they are.
+//! What either leaves of the flow in narrow windows, without smoothness, is the remainder: the step that
+//! Lucas and Kanade would take. Where it is longer than chance explains, smoothness holds the flow back
+//! (small or curved objects). The flow moves by a share of the smoothed frames' remainder, since the finest
+//! detail may be biased; the covariance includes the mean square of the remainder of the frames as they are.
 
 use super::data_term::{COUNT, DataOptions, DataTerm, ERROR, MOTION, normal, right};
 use super::descent::DescentPlan;
@@ -35,19 +35,22 @@ const WINDOWS: [f64; 3] = [3.4, 8.7, 14.3];
 const PRIOR: f64 = 0.5;
 /// Maximum difference at a node, px: larger ones are of two motions.
 const MAX_DIFFERENCE: f64 = 0.1;
-/// Maximum components of what is left at a node, px.
+/// Maximum components of a remainder, px.
 const MAX_REMAINDER: f64 = 1.0;
-/// The same, where the motion moves by it: larger ones are of two motions.
+/// The same, where the flow moves by it: larger ones are of two motions.
 const MAX_STEP: f64 = 0.3;
-/// Mean square of the steps, over that of white noise of the smoothed frames' residuals, which keep a quarter
-/// of the energy, and over the scatter in the narrow window, that is taken for chance.
+/// Minimum sides of frames whose flow moves by remainders, standard deviations of the narrow window.
+const MIN_SIDE: f64 = 4.0;
+/// Mean square of the smoothed frames' remainder, over that of white noise of their residuals (they keep a
+/// quarter of its energy) and over the scatter in the narrow window, that is taken for chance.
 const NOISE_IN_STEP: f64 = 3.0;
 const SCATTER_IN_STEP: f64 = 0.5;
-/// Mean square of a remainder, over that of white noise, that is taken for chance; binomial means of it
-/// before they are compared.
-const NOISE_IN_REMAINDER: f64 = 1.2;
+/// Mean square of a remainder, over that of white noise, that is taken for chance: around a node, and after
+/// more binomial means, 16 px around it.
+const NOISE_IN_REMAINDER: [f64; 2] = [1.5, 1.2];
 const REMAINDER_MEANS: usize = 6;
-/// Bias, px, of which half is removed, and the same as a share of the scatter in the narrow window.
+/// Bias, px, of which half is removed and which steps may have by chance; for the former also as a share of
+/// the scatter in the narrow window.
 const DOUBTFUL_BIAS: f64 = 0.02;
 const DOUBTFUL_SHARE: f64 = 0.1;
 /// Standard deviation of white noise in a data term's first row after the frames are smoothed, over that
@@ -63,12 +66,12 @@ type Square = [f64; 3];
 #[derive(Debug)]
 pub(super) struct DetailBias {
     axes: (NodeAxis, NodeAxis),
-    /// What the flow moves by, px: its bias with the opposite sign, and the step beyond chance.
+    /// What the flow moves by, px: its bias with the opposite sign, and the step.
     correction: Vec<[f64; 2]>,
     /// Mean squared differences around the nodes, px^2, in each of the windows.
     scatter: [Vec<Square>; 3],
-    /// Mean squares around the nodes of what the frames leave of the flow in the narrow window, px^2; and
-    /// their sums over both directions in wide surroundings.
+    /// Mean squares around the nodes of the remainder of the frames as they are, px^2; and their sums over
+    /// both directions in wide surroundings.
     remainder: Vec<Square>,
     wide_remainder: Vec<[f64; 1]>,
 }
@@ -120,7 +123,8 @@ impl DetailBias {
             [kept * u, kept * v]
         };
         let mut correction: Vec<[f64; 2]> = differences.iter().zip(&scatter[0]).map(shrunk).collect();
-        if keeps("flow.step") {
+        let side = level.size.0.min(level.size.1) as f64;
+        if side >= MIN_SIDE * WINDOWS[0] && keeps("flow.step") {
             let steps = steps(&narrow, &scatter[0], size);
             correction.iter_mut().zip(&steps).for_each(|(flow, step)| (0..2).for_each(|c| flow[c] += step[c]));
         }
@@ -148,12 +152,14 @@ impl DetailBias {
         });
     }
 
-    /// Mean square around a node of what the frames leave of the flow, and the share of it that white noise
-    /// of a density `xx, xy, yy`, px^4, does not explain.
+    /// Mean square of the remainder around a node, and the share of it that white noise of a density
+    /// `xx, xy, yy`, px^4, does not explain.
     pub fn remainder(&self, node: usize, density: &Square) -> (Square, f64) {
         let [xx, xy, yy] = self.remainder[node];
         let noise = noise_variance(density[0] + density[2]);
-        ([xx, xy, yy], (1.0 - NOISE_IN_REMAINDER * noise / self.wide_remainder[node][0]).max(0.0))
+        let [near, wide] = NOISE_IN_REMAINDER;
+        let explained = (near / (xx + yy)).min(wide / self.wide_remainder[node][0]);
+        ([xx, xy, yy], (1.0 - noise * explained).max(0.0))
     }
 
     /// Mean squared difference around a node in a window of `sigma` px.
@@ -195,7 +201,8 @@ fn site_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, y: usize) -> Vec
     let normals = [0, 1].map(|c| std::array::from_fn::<_, MOTION, _>(|k| data.line(normal(c, k), y)));
     let [right_u, right_v, errors] = [right(0), right(1), ERROR].map(|k| data.line(k, y));
     let [above, below] = [y.saturating_sub(1), (y + 1).min(data.height - 1)].map(|y| [4, 5].map(|k| motion.line(k, y)));
-    // The mean of curved flow over a site's window, less the flow at the site, per change of the slopes.
+    // Over a site's window, curved flow has the mean `u + sigma^2 (u_xx + u_yy) / 2`. Second derivatives are
+    // differences of the slopes two sites apart; at a border of one site, half as large.
     let window = 0.5 * DataOptions::default().sigma.powi(2) / (2.0 * SITE_SPACING);
     let site = |x: usize| {
         let (before, after) = (x.saturating_sub(1), (x + 1).min(data.width - 1));
@@ -213,7 +220,8 @@ fn site_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, y: usize) -> Vec
     (0..data.width).map(site).collect()
 }
 
-/// Mean squares around the nodes of vectors whose components are at most `most` px.
+/// Mean squares of vectors whose components are at most `most` px, with a standard deviation of 8 px around
+/// the nodes.
 fn mean_squares(vectors: &[[f64; 2]], most: f64, size: (usize, usize)) -> Vec<Square> {
     let bounded = vectors.iter().map(|vector| vector.map(|d| d.clamp(-most, most)));
     let mut squares: Vec<Square> = bounded.map(|[u, v]| [u * u, u * v, v * v]).collect();
@@ -236,15 +244,15 @@ fn typical_energy(sums: &[NodeSums]) -> f64 {
     median(&mut energies).unwrap_or(0.0)
 }
 
-/// What the sums leave of the flow of each node, px. Their own energy is not part of the prior: it is large
-/// where much is left.
+/// Remainders of the flow, px. A node's own residual energy is not part of the prior: it is large where much
+/// is left.
 fn remainders(sums: &[NodeSums]) -> Vec<[f64; 2]> {
     let prior = 2.0 * PRIOR * typical_energy(sums);
     sums.iter().map(|sum| solve(sum, prior)).collect()
 }
 
-/// Steps of the flow beyond chance, px, from the sums of the smoothed frames and the `scatter` by the finest
-/// detail, of which they have a part.
+/// Steps by which the flow moves, px: shares, beyond chance, of the remainders of the smoothed frames, whose
+/// `sums` have a part of the `scatter` by the finest detail.
 fn steps(sums: &[NodeSums], scatter: &[Square], size: (usize, usize)) -> Vec<[f64; 2]> {
     let mut steps = remainders(sums);
     let squares = mean_squares(&steps, MAX_STEP, size);
