@@ -44,3 +44,9 @@ def test_flow_equals_the_python_call(tmp_path):
     json.loads(result.stdout)
     field = jacoflow.FlowField.load(tmp_path / "field.npz")
     np.testing.assert_array_equal(field.flow, jacoflow.flow(*frames).flow)
+
+
+def test_info_says_how_an_archive_of_frames_is_opened(tmp_path):
+    np.savez(tmp_path / "frames.npz", frames=np.zeros((3, 8, 8)))
+    result = run("info", "frames.npz", folder=tmp_path)
+    assert result.returncode == 3 and "jacoflow.io.frames" in result.stderr
