@@ -36,7 +36,7 @@ pub fn observability<'py>(
     }
     let frames = [frames.get(0)?, frames.get(1)?, frames.get(2)?];
     for frame in &frames[1..] {
-        options::check_dtype("frames", frames[0].dtype(), frame)?;
+        frame.expect_dtype("frames", frames[0].dtype())?;
     }
     let scheme = time_scheme.map_or(Ok(TimeScheme::default()), TimeScheme::parse);
     let pixels = neighbourhood.map(options::neighbourhood).transpose()?;

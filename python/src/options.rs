@@ -7,7 +7,7 @@ use jacoflow::image::{GaussianSmoother, Preprocess, Quantiser};
 use jacoflow::jet::Neighbourhood;
 use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
-use jacoflow::types::{AnyFrame, Mask, Precision, Rect, Sample, SamplingGrid, Units};
+use jacoflow::types::{Mask, Precision, Rect, Sample, SamplingGrid, Units};
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -231,8 +231,8 @@ pub fn real(py: Python<'_>, name: &str, value: &Object) -> Outcome<Option<f64>> 
 /// `fps`, as seconds between frames.
 fn frame_period(py: Python<'_>, fps: &Object) -> Outcome<Option<f64>> {
     match real(py, "fps", fps)? {
-        Some(fps) if !(fps.is_finite() && fps > 0.0) => {
-            Err(Error::argument("fps", "a positive number of frames per second", fps).into())
+        Some(fps) if !(1e-20..=1e20).contains(&fps) => {
+            Err(Error::argument("fps", "a positive number of frames per second (1e-20 to 1e20)", fps).into())
         }
         fps => Ok(fps.map(|fps| 1.0 / fps)),
     }
@@ -290,15 +290,6 @@ pub fn units(py: Python<'_>, pitch: &Object, length: Option<&str>, fps: &Object)
 /// `precision=None | "float32" | "float64"`.
 pub fn precision(name: Option<&str>) -> Outcome<Precision> {
     Ok(name.map_or(Ok(Precision::Auto), Precision::parse)?)
-}
-
-/// Refuses a frame that does not continue the sequence.
-pub fn check_dtype(argument: &str, first: &str, frame: &AnyFrame) -> Outcome<()> {
-    if frame.dtype() == first {
-        return Ok(());
-    }
-    Err(PyTypeError::new_err(format!("{argument}: expected {first} like the first frame, got {}", frame.dtype()))
-        .into())
 }
 
 /// `region`: (x, y, width, height), px.

@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
     jacoflow filter frames/ -o out/ --profile patent --quantise --smooth 3\n  \
     jacoflow filter frames/ --profile measured --points 140,140 > point.csv\n  \
     jacoflow filter frames/ -o out/ --stop 200 --save-state state.npz\n  \
-    jacoflow filter frames/ -o out/ --start 200 --resume state.npz"
+    jacoflow filter frames/ -o rest/ --start 200 --resume state.npz"
 )]
 pub struct FilterCommand {
     #[command(flatten)]

@@ -77,20 +77,15 @@ impl AnyFlowFilter {
                 Filter::Single(Box::new(FlowFilter::new(frame.size(), options)?))
             };
         }
-        match self.dtype {
-            Some(first) if first != dtype => {
-                let expected = format!("{first} like the first frame");
-                return Err(Error::Type { argument: "frame", expected, got: dtype.into() });
+        if let Some(first) = self.dtype {
+            frame.expect_dtype("frame", first)?;
+        } else {
+            let scale = each!(&self.filter, filter => filter.options().full_scale, full_scale);
+            if scale != full_scale {
+                let wanted = format!("frames of full scale {scale}, as those of the saved filter");
+                return Err(Error::argument("frame", wanted, format!("{dtype} ({full_scale})")));
             }
-            Some(_) => {}
-            None => {
-                let scale = each!(&self.filter, filter => filter.options().full_scale, full_scale);
-                if scale != full_scale {
-                    let wanted = format!("frames of full scale {scale}, as those of the saved filter");
-                    return Err(Error::argument("frame", wanted, format!("{dtype} ({full_scale})")));
-                }
-                self.dtype = Some(dtype);
-            }
+            self.dtype = Some(dtype);
         }
         match &mut self.filter {
             Filter::Empty => Err(Error::Numerical("the filter has not started".into())),
@@ -106,10 +101,7 @@ impl AnyFlowFilter {
     /// Those of [`push`](Self::push), naming `frames`.
     pub fn smooth(&self, frames: &[AnyFrame]) -> Result<Vec<AnyField>> {
         let Some(first) = frames.first() else { return Ok(Vec::new()) };
-        if let Some(other) = frames.iter().find(|frame| frame.dtype() != first.dtype()) {
-            let (expected, got) = (format!("{} like the first frame", first.dtype()), other.dtype().into());
-            return Err(Error::Type { argument: "frames", expected, got });
-        }
+        frames.iter().try_for_each(|frame| frame.expect_dtype("frames", first.dtype()))?;
         let options = FlowFilterOptions { full_scale: self.full_scale(first), ..self.options.clone() };
         Ok(if self.precision.is_double(first.dtype()) {
             self.smoothed::<f64>(options, frames)?.into_iter().map(AnyField::Double).collect()

@@ -1,7 +1,7 @@
 //! A stream of frames in the precision that its first frame decides.
 
 use super::{FlowStream, StreamPlan};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::types::{AnyField, AnyFrame, Precision};
 
 /// A [`FlowStream`] whose precision and sample type are those of its first frame.
@@ -34,14 +34,11 @@ impl AnyFlowStream {
     /// As [`FlowStream::push_at`].
     ///
     /// # Errors
-    /// Also [`Error::Type`] naming `frames` for another sample type than that of the first frame.
+    /// Also [`Error::Type`](crate::error::Error::Type) naming `frames` for another sample type than that of
+    /// the first frame.
     pub fn push_at(&mut self, frame: AnyFrame, time: Option<f64>) -> Result<Option<AnyField>> {
         let dtype = frame.dtype();
-        let expected = *self.dtype.get_or_insert(dtype);
-        if dtype != expected {
-            let expected = format!("{expected} like the first frame");
-            return Err(Error::Type { argument: "frames", expected, got: dtype.into() });
-        }
+        frame.expect_dtype("frames", self.dtype.get_or_insert(dtype))?;
         if matches!(self.stream, Stream::Empty) {
             let plan = self.plan.clone();
             self.stream = if self.precision.is_double(dtype) {

@@ -216,6 +216,19 @@ macro_rules! any_frame {
             pub fn dtype(&self) -> &'static str {
                 each_sample!(self, _frame: S => S::DTYPE)
             }
+
+            /// Refuses a frame of another sample type than that of the first.
+            ///
+            /// # Errors
+            /// [`Error::Type`] naming `argument`.
+            pub fn expect_dtype(&self, argument: &'static str, first: &str) -> Result<()> {
+                if self.dtype() == first {
+                    return Ok(());
+                }
+                let masked = if [first, self.dtype()].contains(&"float32") { " (integers with a mask are float32)" } else { "" };
+                let (expected, got) = (format!("{first} like the first frame"), format!("{}{masked}", self.dtype()));
+                Err(Error::Type { argument, expected, got })
+            }
         }
     )*};
 }

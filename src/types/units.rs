@@ -1,6 +1,7 @@
 //! The units of a field: one rule for results, pictures and files.
 
 use crate::error::{Error, Result};
+use std::ops::RangeInclusive;
 
 /// What a length and a time of a field are measured in.
 ///
@@ -25,6 +26,9 @@ impl Default for Units {
     }
 }
 
+/// Pitches and periods whose products with flow in float32 neither overflow nor vanish.
+const USABLE: RangeInclusive<f64> = 1e-20..=1e20;
+
 impl Units {
     /// A pitch, the name of its unit, and seconds between frames. Without a name a pitch of 1 is in px, any
     /// other in "length".
@@ -37,17 +41,18 @@ impl Units {
     /// [`Error::Argument`] naming `pixel_pitch` or `frame_period` unless they are positive and finite, and
     /// `length_unit` if it is blank.
     pub fn check(&self) -> Result<()> {
-        let positive = |value: f64| value.is_finite() && value > 0.0;
+        let positive = |value| USABLE.contains(&value);
         let (dx, dy) = self.pixel_pitch;
         if !(positive(dx) && positive(dy)) {
-            return Err(Error::argument("pixel_pitch", "two positive, finite lengths", format!("({dx}, {dy})")));
+            let expected = "two positive, finite lengths (1e-20 to 1e20)";
+            return Err(Error::argument("pixel_pitch", expected, format!("({dx}, {dy})")));
         }
         if self.length.trim().is_empty() {
             return Err(Error::argument("length_unit", "the name of a unit, such as mm", format!("{:?}", self.length)));
         }
         match self.frame_period {
             Some(period) if !positive(period) => {
-                Err(Error::argument("frame_period", "a positive number of seconds", period))
+                Err(Error::argument("frame_period", "a positive number of seconds (1e-20 to 1e20)", period))
             }
             _ => Ok(()),
         }

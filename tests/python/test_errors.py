@@ -82,6 +82,8 @@ def test_frames_that_cannot_be_used(frames, error, message, method):
         ({"mask": np.ones((8, 10), np.uint8)}, TypeError, "mask: expected a boolean array"),
         ({"mask": np.ones(8, bool)}, ValueError, r"mask: expected shape \(H, W\)"),
         ({"fps": 0.0}, ValueError, "fps: "),
+        ({"fps": 1e300}, ValueError, r"fps: expected a positive number of frames per second \(1e-20 to 1e20\)"),
+        ({"pixel_pitch": 1e-300}, ValueError, "pixel_pitch: "),
         ({"pixel_pitch": 0.0}, ValueError, "pixel_pitch: "),
         ({"pixel_pitch": "mm"}, TypeError, "pixel_pitch: "),
         ({"noise": -1.0}, ValueError, "noise: "),
@@ -314,6 +316,12 @@ def test_a_frame_of_another_dtype_is_the_frame_that_was_pushed():
     estimator.push(GOOD[0])
     with pytest.raises(TypeError, match="^frame: expected uint8 like the first frame, got uint16"):
         estimator.push(GOOD[1].astype(np.uint16))
+
+
+def test_integers_with_a_mask_are_not_of_the_type_of_those_without():
+    masked = np.ma.masked_array(GOOD[1], mask=GOOD[1] > 250)
+    with pytest.raises(TypeError, match="^frames: expected uint8 like the first frame, got float32 .integers with a mask are float32."):
+        jacoflow.flow(GOOD[0], masked)
 
 
 def test_parameters_of_a_scene_are_numbers():

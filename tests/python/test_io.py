@@ -126,6 +126,17 @@ def test_animated_png_is_no_picture(frames, tmp_path):
         io.read_image(tmp_path / "a.png")
 
 
+@pytest.mark.parametrize("kind", [5, 6])
+def test_several_pictures_in_one_pnm_are_not_one(kind, tmp_path):
+    pixels = bytes(8 * 6 * (1 if kind == 5 else 3))
+    picture = f"P{kind}\n8 6\n255\n".encode() + pixels
+    (tmp_path / "one.pnm").write_bytes(picture + b"\n")
+    assert io.read_image(tmp_path / "one.pnm", colour="luminance").shape == (6, 8)
+    (tmp_path / "two.pnm").write_bytes(picture + picture)
+    with pytest.raises(jacoflow.FormatError, match="several PGM or PPM pictures in one file"):
+        io.read_image(tmp_path / "two.pnm", colour="luminance")
+
+
 def test_a_field_of_negative_width_is_named(tmp_path):
     (tmp_path / "a.flo").write_bytes(np.float32(202021.25).tobytes() + np.array([-5, 7], "<i4").tobytes())
     with pytest.raises(jacoflow.FormatError, match="a field of -5 x 7 px"):

@@ -118,6 +118,12 @@ def test_copies_have_their_mean_and_variance(scheme, variances):
     assert_allclose(copies.var(axis=0), variances, atol=0.05)
 
 
+@pytest.mark.parametrize("scheme", ["multinomial", "stratified", "systematic", "residual"])
+def test_weights_whose_sum_is_beyond_the_largest_number_count(scheme):
+    copies = np.bincount(resample([1e308, 3e307, 1e308], 400, scheme, random_state=1), minlength=3)
+    assert_allclose(copies / 400, np.array([10, 3, 10]) / 23, atol=0.08)
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 60))
 def test_schemes_select_what_filterpy_selects(seed, count):

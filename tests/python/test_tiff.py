@@ -226,6 +226,14 @@ def test_colour_in_chunks_and_planes(tmp_path):
             read(tmp_path / name)
 
 
+def test_colour_in_planes_of_tiles_that_reach_beyond_the_picture(tmp_path):
+    colour = RNG.integers(0, 256, (20, 30, 3)).astype(np.uint8)
+    tifffile.imwrite(tmp_path / "t.tif", np.moveaxis(colour, 2, 0), tile=(16, 16), photometric="rgb", planarconfig="separate")
+    assert_array_equal(read(tmp_path / "t.tif", colour="rgb"), colour[None])
+    with pytest.raises(jacoflow.MissingDependencyError, match="tiles that reach beyond the picture"):
+        io.read_image(tmp_path / "t.tif", colour="luminance")
+
+
 @pytest.mark.parametrize("compression", [None, "zlib", "zstd"])
 def test_palettes(compression, tmp_path):
     ramp = np.arange(256, dtype=np.uint16) * 257

@@ -51,6 +51,14 @@ pub fn resample_indices(
     out: &mut Vec<usize>,
 ) {
     out.clear();
+    let largest = weights.iter().copied().fold(0.0, f64::max);
+    let scaled: Vec<f64>;
+    let weights = if largest > f64::MAX / weights.len() as f64 && largest.is_finite() {
+        scaled = weights.iter().map(|weight| weight / largest).collect();
+        &scaled
+    } else {
+        weights
+    };
     let share = |i: usize, u: f64| (i as f64 + u) / count as f64;
     match scheme {
         Resampling::Multinomial => draw(&Cumulative::new(weights.iter().copied()), count, uniform, out),

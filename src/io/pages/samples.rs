@@ -10,7 +10,7 @@ use crate::types::Sample;
 use std::io::{Read, Seek};
 use std::path::Path;
 use tiff::ColorType;
-use tiff::decoder::{Decoder, DecodingResult};
+use tiff::decoder::{ChunkType, Decoder, DecodingResult};
 use tiff::tags::Tag;
 
 /// ExtraSamples of an alpha channel: premultiplied or not.
@@ -71,6 +71,9 @@ impl Place<'_> {
             }
             other => return Err(unsupported(path, &format!("pixels of kind {other:?}"))),
         };
+        if count > 1 && has_cut_tiles(decoder) {
+            return Err(unsupported(path, "colours in planes of tiles that reach beyond the picture"));
+        }
         let mut result = DecodingResult::U8(Vec::new());
         let layout = decoder.read_image_to_buffer(&mut result).map_err(|e| tiff_error(path, e))?;
         let planes = if layout.planes > 1 { count } else { 1 };
@@ -155,6 +158,13 @@ impl Place<'_> {
         }
         self.frame(channels, 1, levels, policy)
     }
+}
+
+/// Whether each channel has tiles of its own and the last ones reach beyond the picture: the decoder panics.
+fn has_cut_tiles<R: Read + Seek>(decoder: &mut Decoder<R>) -> bool {
+    let (tile, size) = (decoder.chunk_dimensions(), decoder.dimensions().unwrap_or_default());
+    let is_cut = !size.0.is_multiple_of(tile.0.max(1)) || !size.1.is_multiple_of(tile.1.max(1));
+    is_cut && decoder.get_chunk_type() == ChunkType::Tile && number(decoder, Tag::PlanarConfiguration) == Some(2)
 }
 
 fn has_alpha<R: Read + Seek>(decoder: &mut Decoder<R>) -> bool {
