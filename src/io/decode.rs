@@ -1,10 +1,9 @@
 //! Image files to grey or colour frames.
 
 use super::limits::{MAX_SIDE, check_size, io_error, memory_limit};
-use super::{channels::ChannelPolicy, channels::Channels, jpeg, pages::Pages, planes::PlaneSelection};
+use super::{channels::ChannelPolicy, channels::Channels, jpeg, pages::Pages, planes::PlaneSelection, pnm};
 use crate::error::{Error, Result};
 use crate::types::Sample;
-use ::image::codecs::pnm::{PnmDecoder, PnmSubtype, SampleEncoding};
 use ::image::metadata::Orientation;
 use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult};
 use std::fs::File;
@@ -85,9 +84,8 @@ fn read_one_picture<P: ChannelPolicy>(path: &Path, policy: P) -> Result<P::Frame
             "an animated PNG, of several pictures; expected one (ffmpeg -i FILE frames/%06d.png takes them out)";
         return Err(Error::format(path, message));
     }
-    if reader.format() == Some(ImageFormat::Pnm) && is_sequence(path) {
-        let message = "several PGM or PPM pictures in one file; expected one (ffmpeg -f image2pipe -i FILE frames/%06d.png takes them out)";
-        return Err(Error::format(path, message));
+    if reader.format() == Some(ImageFormat::Pnm) {
+        pnm::check(path)?;
     }
     let picture = upright(reader, memory).map_err(|error| image_error(path, error))?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
@@ -137,25 +135,6 @@ fn is_animated(path: &Path) -> bool {
     let Ok(file) = File::open(path) else { return false };
     let reader = png::Decoder::new(BufReader::new(file)).read_info();
     reader.is_ok_and(|reader| reader.info().animation_control().is_some())
-}
-
-/// Whether another picture follows that of a binary PGM or PPM file.
-fn is_sequence(path: &Path) -> bool {
-    let next = || {
-        let mut file = BufReader::new(File::open(path).ok()?);
-        let decoder = PnmDecoder::new(&mut file).ok()?;
-        let (PnmSubtype::Graymap(SampleEncoding::Binary) | PnmSubtype::Pixmap(SampleEncoding::Binary)) =
-            decoder.subtype()
-        else {
-            return None;
-        };
-        let pixels = decoder.total_bytes();
-        file.seek_relative(i64::try_from(pixels).ok()?).ok()?;
-        let mut magic = [0; 2];
-        file.read_exact(&mut magic).ok()?;
-        Some(magic)
-    };
-    next().is_some_and(|[letter, digit]| letter == b'P' && digit.is_ascii_digit())
 }
 
 fn image_error(path: &Path, error: ImageError) -> Error {

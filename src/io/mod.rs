@@ -24,6 +24,7 @@ mod pfm;
 mod picture_png;
 mod picture_sequence;
 mod planes;
+mod pnm;
 mod sink;
 mod sixteen_bit_png;
 mod source;

@@ -126,15 +126,25 @@ def test_animated_png_is_no_picture(frames, tmp_path):
         io.read_image(tmp_path / "a.png")
 
 
-@pytest.mark.parametrize("kind", [5, 6])
+@pytest.mark.parametrize("kind", range(1, 7))
 def test_several_pictures_in_one_pnm_are_not_one(kind, tmp_path):
-    pixels = bytes(8 * 6 * (1 if kind == 5 else 3))
-    picture = f"P{kind}\n8 6\n255\n".encode() + pixels
+    samples = 8 * 6 * (3 if kind in (3, 6) else 1)
+    pixels = b"0 " * samples + b"\n# a comment: P2\n" if kind < 4 else bytes(samples // 8 if kind == 4 else samples)
+    picture = f"P{kind}\n8 6\n{'' if kind in (1, 4) else '255'}\n".encode().replace(b"\n\n", b"\n") + pixels
     (tmp_path / "one.pnm").write_bytes(picture + b"\n")
     assert io.read_image(tmp_path / "one.pnm", colour="luminance").shape == (6, 8)
     (tmp_path / "two.pnm").write_bytes(picture + picture)
     with pytest.raises(jacoflow.FormatError, match="several PGM or PPM pictures in one file"):
         io.read_image(tmp_path / "two.pnm", colour="luminance")
+
+
+@pytest.mark.parametrize(
+    "content", [b"P2\n2 1\n100\n7 101\n", b"P5\n2 1\n100\n\x07\x65", b"P5\n2 1\n1000\n\x00\x07\x03\xe9", b"P3\n1 1\n9\n1 2 10\n", b"P6\n1 1\n9\n\1\2\12"]
+)
+def test_samples_above_the_maximum_of_a_pgm_are_refused(content, tmp_path):
+    (tmp_path / "a.pnm").write_bytes(content)
+    with pytest.raises(jacoflow.FormatError, match="holds a sample of (101|1001|10); expected at most (100|1000|9), the maximum in its header"):
+        io.read_image(tmp_path / "a.pnm", colour="luminance")
 
 
 def test_a_field_of_negative_width_is_named(tmp_path):
