@@ -230,12 +230,7 @@ pub fn real(py: Python<'_>, name: &str, value: &Object) -> Outcome<Option<f64>> 
 
 /// `fps`, as seconds between frames.
 fn frame_period(py: Python<'_>, fps: &Object) -> Outcome<Option<f64>> {
-    match real(py, "fps", fps)? {
-        Some(fps) if !(1e-20..=1e20).contains(&fps) => {
-            Err(Error::argument("fps", "a positive number of frames per second (1e-20 to 1e20)", fps).into())
-        }
-        fps => Ok(fps.map(|fps| 1.0 / fps)),
-    }
+    Ok(real(py, "fps", fps)?.map(Units::period_at).transpose()?)
 }
 
 /// `preprocess`: what is done to each frame first.

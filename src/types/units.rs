@@ -26,8 +26,17 @@ impl Default for Units {
     }
 }
 
-/// Pitches and periods whose products with flow in float32 neither overflow nor vanish.
+/// Pitches, periods and frame rates whose products with flow in float32 neither overflow nor vanish.
 const USABLE: RangeInclusive<f64> = 1e-20..=1e20;
+
+/// Refuses a value of `argument` outside [`USABLE`]; `expected` says what it is.
+fn expect_usable(argument: &'static str, expected: &str, value: f64) -> Result<()> {
+    if USABLE.contains(&value) {
+        return Ok(());
+    }
+    let expected = format!("{expected} ({:e} to {:e})", USABLE.start(), USABLE.end());
+    Err(Error::argument(argument, expected, value))
+}
 
 impl Units {
     /// A pitch, the name of its unit, and seconds between frames. Without a name a pitch of 1 is in px, any
@@ -37,25 +46,25 @@ impl Units {
         Self { pixel_pitch, length: length.unwrap_or(default).into(), frame_period }
     }
 
+    /// Seconds between frames at `fps` frames per second.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] naming `fps` for a rate that is not positive, or beyond what float32 can hold.
+    pub fn period_at(fps: f64) -> Result<f64> {
+        expect_usable("fps", "a positive number of frames per second", fps)?;
+        Ok(1.0 / fps)
+    }
+
     /// # Errors
     /// [`Error::Argument`] naming `pixel_pitch` or `frame_period` unless they are positive and finite, and
     /// `length_unit` if it is blank.
     pub fn check(&self) -> Result<()> {
-        let positive = |value| USABLE.contains(&value);
         let (dx, dy) = self.pixel_pitch;
-        if !(positive(dx) && positive(dy)) {
-            let expected = "two positive, finite lengths (1e-20 to 1e20)";
-            return Err(Error::argument("pixel_pitch", expected, format!("({dx}, {dy})")));
-        }
+        [dx, dy].into_iter().try_for_each(|side| expect_usable("pixel_pitch", "positive, finite lengths", side))?;
         if self.length.trim().is_empty() {
             return Err(Error::argument("length_unit", "the name of a unit, such as mm", format!("{:?}", self.length)));
         }
-        match self.frame_period {
-            Some(period) if !positive(period) => {
-                Err(Error::argument("frame_period", "a positive number of seconds (1e-20 to 1e20)", period))
-            }
-            _ => Ok(()),
-        }
+        self.frame_period.map_or(Ok(()), |period| expect_usable("frame_period", "a positive number of seconds", period))
     }
 
     /// Whether lengths are px and times are frames.
