@@ -151,7 +151,15 @@ def _old_matlab(request: Request) -> Frame:
     matlab = _package(request, "scipy.io", "MATLAB files before 7.3")
     kinds = {"double", "single", "logical", *(f"{sign}int{bits}" for sign in ("u", "") for bits in (8, 16, 32, 64))}
     listed = _readable(request, "MATLAB", lambda: matlab.whosmat(request.source))
-    name = _chosen(request, {name: shape for name, shape, kind in listed if kind in kinds})
+    shapes = {name: shape for name, shape, kind in listed if kind in kinds}
+    for name, _, kind in listed:
+        if name not in shapes and (name == request.key or (request.key is None and not shapes)):
+            raise FormatError(
+                f"{request.source}: {name} is a {kind}; expected an array of numbers. In MATLAB save the frames as "
+                f"a variable of their own (of a struct: frames = {name}.frames; save('frames.mat', 'frames')), or in "
+                f"Python take them out of scipy.io.loadmat(path, simplify_cells=True)[{name!r}] and pass the array"
+            )
+    name = _chosen(request, shapes)
     array: Frame = _readable(request, "MATLAB", lambda: matlab.loadmat(request.source, variable_names=[name])[name])
     return array
 

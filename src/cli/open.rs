@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use crate::flow::InitialFlow;
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::io::{
-    ChannelPolicy, Colour, FilesSource, FrameFormat, FrameSource, OpenOptions, PixelSize, Selected, open, open_colour,
-    read_flo, read_image, read_kitti,
+    ChannelPolicy, Colour, FilesSource, FrameFormat, FrameSource, OpenOptions, PixelSize, Selected, kind_of, open,
+    open_colour, read_flo, read_image, read_kitti,
 };
 use crate::parallel::Threads;
 use crate::pipeline::{FirstFrame, Numbering, peek};
@@ -111,8 +111,11 @@ fn open_files<P: ChannelPolicy>(
     policy: P,
     options: &OpenOptions,
 ) -> Result<Box<dyn FrameSource<P::Frame>>> {
-    if let Some(folder) = many.iter().find(|path| Path::new(path).is_dir()) {
-        return Err(Error::argument("input", "image files only, when several inputs are given", folder));
+    let is_sequence = |path: &&String| {
+        Path::new(path).is_dir() || matches!(kind_of(path), Some("y4m" | "npy" | "list" | "unreadable"))
+    };
+    if let Some(sequence) = many.iter().find(is_sequence) {
+        return Err(Error::argument("input", "image files only, when several inputs are given", sequence));
     }
     let files = FilesSource::new(many.iter().map(PathBuf::from).collect(), policy)?.with_planes(options.planes);
     Ok(Box::new(Selected::new(files, options)?))

@@ -62,6 +62,7 @@ fn unusable_arguments_are_named() {
         ("measure s.npy --quantity curl --method horn-schunck", &["method"]),
         ("measure s.npy --quantity curl -o rows.txt", &["output", ".csv"]),
         ("measure s.npy --quantity curl --json", &["output"]),
+        ("measure s.npy s.npy --quantity curl", &["input", "image files only", "s.npy"]),
         ("filter s.npy --profile mine", &["profile"]),
         ("filter s.npy --form square", &["form"]),
         ("filter s.npy --process-noise 1,2", &["--process-noise"]),

@@ -36,6 +36,14 @@ def test_missing_input_has_exit_code_1(tmp_path):
     assert not (tmp_path / "out").exists() or not any((tmp_path / "out").iterdir())
 
 
+def test_inputs_that_are_no_frames_are_named(tmp_path):
+    result = run("info", "/dev/null", folder=tmp_path)
+    assert result.returncode == 1 and "/dev/null: neither a file nor a folder; expected one of these" in result.stderr
+    (tmp_path / "a.y4m").write_bytes(b"")
+    result = run("measure", "a.y4m", "a.y4m", "--quantity", "u", folder=tmp_path)
+    assert result.returncode == 2 and "input: expected image files only, when several inputs are given, got a.y4m" in result.stderr
+
+
 def test_flow_equals_the_python_call(tmp_path):
     frames = np.clip(np.round(jacoflow.scenes.Scene("affine", width=40, height=32).frames(3)), 0, 255).astype(np.uint8)
     np.save(tmp_path / "frames.npy", frames)

@@ -150,3 +150,11 @@ def test_the_binary_says_what_can_be_done(name, advice, tmp_path):
     if name.rsplit(".", 1)[1] not in ("npz", "h5", "mat"):
         with pytest.raises(jacoflow.MissingDependencyError, match=advice):
             io.frames(tmp_path / name)
+
+
+@pytest.mark.parametrize("key", [None, "recording"])
+def test_a_struct_of_matlab_says_what_to_do(tmp_path, key):
+    scipy_io = pytest.importorskip("scipy.io")
+    scipy_io.savemat(tmp_path / "a.mat", {"recording": {"frames": STACK, "rate": 25.0}})
+    with pytest.raises(jacoflow.FormatError, match=r"recording is a struct; expected an array of numbers. In MATLAB save .*loadmat"):
+        io.frames(tmp_path / "a.mat", key=key)

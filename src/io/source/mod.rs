@@ -185,6 +185,12 @@ pub fn kind_of(spec: &str) -> Option<&'static str> {
 }
 
 fn nothing_there(spec: &str) -> Error {
+    if Path::new(spec).exists() {
+        return Error::format(
+            spec,
+            "neither a file nor a folder; expected one of these, or - for Y4M on standard input",
+        );
+    }
     Error::io(spec, std::io::Error::new(std::io::ErrorKind::NotFound, "no such file or folder"))
 }
 
