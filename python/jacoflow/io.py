@@ -157,8 +157,8 @@ def read_disparity(path: _Path) -> NDArray[np.float32]:
 
 
 def write_disparity(path: _Path, disparity: ArrayLike) -> int:
-    """Writes disparity (H, W), px, NaN where there is none, by the name's ending; returns how many values the
-    format could not hold.
+    """Writes disparity (H, W), px, NaN or infinite where there is none, by the name's ending; returns how many
+    values the format could not hold.
 
     .npz and .pfm hold all; .png is the KITTI benchmark's, 16 bit in steps of 1/256 px, for disparities above
     0 and below 256 px.

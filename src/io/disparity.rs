@@ -43,7 +43,8 @@ impl DisparityFormat {
         Self::ALL.into_iter().find(|format| format.extension() == extension)
     }
 
-    /// Writes a map, whole or not at all; returns how many disparities the format could not hold.
+    /// Writes a map, whole or not at all; returns how many disparities the format could not hold. One that is
+    /// infinite counts as absent.
     ///
     /// # Errors
     /// [`Error::Argument`] for an empty map or a score of another size, [`Error::Io`] with the path.
@@ -57,7 +58,10 @@ impl DisparityFormat {
             ));
         }
         match self {
-            Self::Npz => write_npz(path, map).map(|()| 0),
+            Self::Npz => {
+                let disparity = map.disparity.map(|&d| if d.is_finite() { d } else { f32::NAN });
+                write_npz(path, &DisparityMap { disparity, ..map.clone() }).map(|()| 0)
+            }
             Self::Pfm => {
                 let plane = map.disparity.data().iter().map(|&d| if d.is_finite() { d } else { f32::INFINITY });
                 write_pfm(path, &FloatMap { width, height, planes: vec![plane.collect()] }).map(|()| 0)

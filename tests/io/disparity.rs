@@ -46,6 +46,18 @@ fn maps_come_back_as_far_as_the_format_holds_them() {
 }
 
 #[test]
+fn infinite_disparities_are_absent_in_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let disparity = Frame::new(3, 1, vec![f32::INFINITY, 1.5, f32::NEG_INFINITY]).unwrap();
+    for format in [DisparityFormat::Npz, DisparityFormat::Pfm, DisparityFormat::Kitti] {
+        let path = folder.path().join(format!("a.{}", format.extension()));
+        assert_eq!(format.write(&path, &DisparityMap::plain(disparity.clone())).unwrap(), 0);
+        let back = format.read(&path).unwrap().disparity;
+        assert!(back.data()[0].is_nan() && back.data()[1] == 1.5 && back.data()[2].is_nan(), "{format:?}");
+    }
+}
+
+#[test]
 fn pictures_of_another_kind_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.png");
