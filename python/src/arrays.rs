@@ -1,6 +1,6 @@
 //! numpy arrays in, core frames out, and back. Messages name the argument, what it was and what is accepted.
 
-use super::samples::{exact_samples, is_masked, refuse_non_array};
+use super::samples::{exact_samples, is_masked, refuse_non_array, sample_type};
 use crate::errors::{Outcome, Raised};
 use jacoflow::buffer_pool;
 use jacoflow::error::{Error, check_memory, shape_text};
@@ -112,6 +112,13 @@ pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> O
 pub fn frame_with_gaps(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
     refuse_non_array(argument, object)?;
     converted(argument, native(object)?, colour)
+}
+
+/// As [`frame_with_gaps`], with the type in which the samples were given: a mask turns integers into floats.
+pub fn typed_frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<(AnyFrame, &'static str)> {
+    let frame = frame_with_gaps(argument, object, colour)?;
+    let dtype = sample_type(object, &frame)?;
+    Ok((frame, dtype))
 }
 
 /// As [`frame_with_gaps`], for trackers, whose thresholds are in grey levels: see [`unmasked`].

@@ -1,6 +1,6 @@
 //! A sequence of frames as Python gives it: a stack, a list, an iterator, or a reader of a file.
 
-use super::arrays::{ColourRule, frame_with_gaps, native};
+use super::arrays::{ColourRule, native, typed_frame};
 use super::samples::refuse_non_array;
 use crate::errors::Outcome;
 use jacoflow::error::shape_text;
@@ -103,15 +103,10 @@ impl<'py> Frames<'py> {
         Self { names, ..self }
     }
 
-    /// What frame `index` came as.
-    pub fn item(&self, index: usize) -> Outcome<Bound<'py, PyAny>> {
-        Ok(self.object.get_item(index)?)
-    }
-
-    /// Frame `index`.
-    pub fn get(&self, index: usize) -> Outcome<AnyFrame> {
+    /// Frame `index`, and the type in which its samples were given.
+    pub fn get(&self, index: usize) -> Outcome<(AnyFrame, &'static str)> {
         let name = self.names.get(index).copied().unwrap_or("frames");
-        frame_with_gaps(name, &self.item(index)?, self.colour)
+        typed_frame(name, &self.object.get_item(index)?, self.colour)
     }
 }
 

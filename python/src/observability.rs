@@ -9,7 +9,7 @@ use crate::interrupt::interruptible;
 use jacoflow::error::Error;
 use jacoflow::flow::{Observability, observability as core};
 use jacoflow::jet::TimeScheme;
-use jacoflow::types::AnyFrame;
+use jacoflow::types::{AnyFrame, expect_dtype};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -35,9 +35,10 @@ pub fn observability<'py>(
         return Err(Error::argument("frames", "three frames", format!("{} frames", frames.count)).into());
     }
     let frames = [frames.get(0)?, frames.get(1)?, frames.get(2)?];
-    for frame in &frames[1..] {
-        frame.expect_dtype("frames", frames[0].dtype())?;
+    for (_, dtype) in &frames[1..] {
+        expect_dtype("frames", dtype, frames[0].1)?;
     }
+    let frames = frames.map(|(frame, _)| frame);
     let scheme = time_scheme.map_or(Ok(TimeScheme::default()), TimeScheme::parse);
     let pixels = neighbourhood.map(options::neighbourhood).transpose()?;
     let steps = preprocess.steps(None)?;

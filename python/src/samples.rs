@@ -1,7 +1,7 @@
 //! Arrays of any sample type as arrays of the types that the core has, where these hold the samples exactly.
 
 use crate::errors::Outcome;
-use jacoflow::types::LARGEST_EXACT_INTEGER;
+use jacoflow::types::{AnyFrame, LARGEST_EXACT_INTEGER, Sample};
 use numpy::{PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -33,6 +33,19 @@ pub fn exact_samples<'py>(argument: &str, array: Bound<'py, PyUntypedArray>) -> 
     let converted = array.call_method1("astype", (wanted,))?;
     let converted = if masked { converted.call_method1("filled", (f64::NAN,))? } else { converted };
     Ok(converted.cast_into::<PyUntypedArray>()?)
+}
+
+/// The type in which the samples of a frame were given: integers of a masked array are floats in the frame.
+pub fn sample_type(object: &Bound<'_, PyAny>, frame: &AnyFrame) -> Outcome<&'static str> {
+    if !is_masked(object)? {
+        return Ok(frame.dtype());
+    }
+    let dtype = object.cast::<PyUntypedArray>()?.dtype();
+    Ok(match (dtype.kind(), dtype.itemsize()) {
+        (b'b', _) | (b'u', 1) => u8::DTYPE,
+        (b'u', 2) => u16::DTYPE,
+        _ => frame.dtype(),
+    })
 }
 
 /// Refuses integers that float64 does not hold.

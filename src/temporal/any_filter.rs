@@ -7,7 +7,7 @@ use crate::image::Preprocess;
 use crate::io::Element;
 use crate::io::npz::NpzReader;
 use crate::simd::SimdReal;
-use crate::types::{AnyField, AnyFrame, FlowField, Precision, Sample};
+use crate::types::{AnyField, AnyFrame, FlowField, Precision, Sample, expect_dtype};
 use std::io::{Cursor, Read, Seek};
 use std::path::Path;
 
@@ -61,14 +61,15 @@ impl AnyFlowFilter {
         Self { options, full_scale_given, preprocess, precision, dtype: None, filter: Filter::Empty }
     }
 
-    /// The field after the next frame.
+    /// The field after the next frame. `dtype` is the type that the samples were given in, which is not that
+    /// of the frame where a mask turned integers into floats.
     ///
     /// # Errors
     /// Those of [`FlowFilter::new`] and [`FlowFilter::push`]; [`Error::Type`] naming `frame` for another
-    /// sample type than that of the first frame; [`Error::Argument`] naming `frame` for frames of another
+    /// `dtype` than that of the first frame; [`Error::Argument`] naming `frame` for frames of another
     /// scale than those of a loaded state. The filter is then unchanged.
-    pub fn push(&mut self, frame: &AnyFrame) -> Result<AnyField> {
-        let (dtype, full_scale) = (frame.dtype(), self.full_scale(frame));
+    pub fn push(&mut self, frame: &AnyFrame, dtype: &'static str) -> Result<AnyField> {
+        let full_scale = self.full_scale(dtype);
         if matches!(self.filter, Filter::Empty) {
             let options = FlowFilterOptions { full_scale, ..self.options.clone() };
             self.filter = if self.precision.is_double(dtype) {
@@ -78,7 +79,7 @@ impl AnyFlowFilter {
             };
         }
         if let Some(first) = self.dtype {
-            frame.expect_dtype("frame", first)?;
+            expect_dtype("frame", dtype, first)?;
         } else {
             let scale = each!(&self.filter, filter => filter.options().full_scale, full_scale);
             if scale != full_scale {
@@ -94,16 +95,18 @@ impl AnyFlowFilter {
         }
     }
 
-    /// The field of each of some frames from the frames before and after it, by a two-filter smoother (D. C.
-    /// Fraser, J. E. Potter, 1969) with the options of this filter, which stays as it is.
+    /// The field of each of some frames, whose samples were given in the type `dtype`, from the frames before
+    /// and after it, by a two-filter smoother (D. C. Fraser, J. E. Potter, 1969) with the options of this
+    /// filter, which stays as it is.
     ///
     /// # Errors
-    /// Those of [`push`](Self::push), naming `frames`.
-    pub fn smooth(&self, frames: &[AnyFrame]) -> Result<Vec<AnyField>> {
-        let Some(first) = frames.first() else { return Ok(Vec::new()) };
-        frames.iter().try_for_each(|frame| frame.expect_dtype("frames", first.dtype()))?;
-        let options = FlowFilterOptions { full_scale: self.full_scale(first), ..self.options.clone() };
-        Ok(if self.precision.is_double(first.dtype()) {
+    /// Those of [`FlowFilter::new`] and [`FlowFilter::push`].
+    pub fn smooth(&self, frames: &[AnyFrame], dtype: &str) -> Result<Vec<AnyField>> {
+        if frames.is_empty() {
+            return Ok(Vec::new());
+        }
+        let options = FlowFilterOptions { full_scale: self.full_scale(dtype), ..self.options.clone() };
+        Ok(if self.precision.is_double(dtype) {
             self.smoothed::<f64>(options, frames)?.into_iter().map(AnyField::Double).collect()
         } else {
             self.smoothed::<f32>(options, frames)?.into_iter().map(AnyField::Single).collect()
@@ -194,11 +197,11 @@ impl AnyFlowFilter {
         self.resume(filter, dtype)
     }
 
-    /// The sample value of 255 grey levels for frames like this one.
-    fn full_scale(&self, frame: &AnyFrame) -> f64 {
-        match (self.full_scale_given, frame) {
-            (false, AnyFrame::U8(_)) => u8::FULL_SCALE,
-            (false, AnyFrame::U16(_)) => u16::FULL_SCALE,
+    /// The sample value of 255 grey levels for frames of this type.
+    fn full_scale(&self, dtype: &str) -> f64 {
+        match dtype {
+            u8::DTYPE if !self.full_scale_given => u8::FULL_SCALE,
+            u16::DTYPE if !self.full_scale_given => u16::FULL_SCALE,
             _ => self.options.full_scale,
         }
     }

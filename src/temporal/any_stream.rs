@@ -2,7 +2,7 @@
 
 use super::{FlowStream, StreamPlan};
 use crate::error::Result;
-use crate::types::{AnyField, AnyFrame, Precision};
+use crate::types::{AnyField, AnyFrame, Precision, expect_dtype};
 
 /// A [`FlowStream`] whose precision and sample type are those of its first frame.
 #[derive(Debug)]
@@ -31,14 +31,14 @@ impl AnyFlowStream {
         Self { plan, precision, dtype: None, stream: Stream::Empty }
     }
 
-    /// As [`FlowStream::push_at`].
+    /// As [`FlowStream::push_at`]. `dtype` is the type that the samples were given in, which is not that of
+    /// the frame where a mask turned integers into floats.
     ///
     /// # Errors
-    /// Also [`Error::Type`](crate::error::Error::Type) naming `frames` for another sample type than that of
-    /// the first frame.
-    pub fn push_at(&mut self, frame: AnyFrame, time: Option<f64>) -> Result<Option<AnyField>> {
-        let dtype = frame.dtype();
-        frame.expect_dtype("frames", self.dtype.get_or_insert(dtype))?;
+    /// Also [`Error::Type`](crate::error::Error::Type) naming `frames` for another `dtype` than that of the
+    /// first frame.
+    pub fn push_at(&mut self, frame: AnyFrame, dtype: &'static str, time: Option<f64>) -> Result<Option<AnyField>> {
+        expect_dtype("frames", dtype, self.dtype.get_or_insert(dtype))?;
         if matches!(self.stream, Stream::Empty) {
             let plan = self.plan.clone();
             self.stream = if self.precision.is_double(dtype) {

@@ -216,19 +216,6 @@ macro_rules! any_frame {
             pub fn dtype(&self) -> &'static str {
                 each_sample!(self, _frame: S => S::DTYPE)
             }
-
-            /// Refuses a frame of another sample type than that of the first.
-            ///
-            /// # Errors
-            /// [`Error::Type`] naming `argument`.
-            pub fn expect_dtype(&self, argument: &'static str, first: &str) -> Result<()> {
-                if self.dtype() == first {
-                    return Ok(());
-                }
-                let masked = if [first, self.dtype()].contains(&"float32") { " (integers with a mask are float32)" } else { "" };
-                let (expected, got) = (format!("{first} like the first frame"), format!("{}{masked}", self.dtype()));
-                Err(Error::Type { argument, expected, got })
-            }
         }
     )*};
 }
@@ -237,6 +224,17 @@ any_frame! {
     AnyFrame(Frame)
     /// A colour frame as it came from a file or an array, in its own sample type.
     AnyColourFrame(ColourFrame)
+}
+
+/// Refuses a frame whose samples are of type `dtype`, where those of the first are of another.
+///
+/// # Errors
+/// [`Error::Type`] naming `argument`.
+pub fn expect_dtype(argument: &'static str, dtype: &str, first: &str) -> Result<()> {
+    if dtype == first {
+        return Ok(());
+    }
+    Err(Error::Type { argument, expected: format!("{first} like the first frame"), got: dtype.into() })
 }
 
 impl AnyFrame {

@@ -15,7 +15,7 @@ mod units;
 pub use camera::Intrinsics;
 pub(crate) use choice::{choice_by_name, choices};
 pub use field::{FieldLayout, FlowField};
-pub use frame::{AnyColourFrame, AnyFrame, ColourFrame, Frame, LARGEST_EXACT_INTEGER, Mask, Sample};
+pub use frame::{AnyColourFrame, AnyFrame, ColourFrame, Frame, LARGEST_EXACT_INTEGER, Mask, Sample, expect_dtype};
 pub use interval::Interval;
 pub use motion::{AffineFlow, MOTION_NAMES};
 pub use precision::{AnyField, Precision};

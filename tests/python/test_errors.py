@@ -318,10 +318,32 @@ def test_a_frame_of_another_dtype_is_the_frame_that_was_pushed():
         estimator.push(GOOD[1].astype(np.uint16))
 
 
-def test_integers_with_a_mask_are_not_of_the_type_of_those_without():
+@pytest.mark.parametrize("dtype", [bool, np.uint8, ">u2", np.uint16, np.int16, np.int64])
+def test_integers_with_and_without_a_mask_are_of_one_type(dtype):
+    frames = (scenes.Scene("affine", width=48, height=40).frames(3) > 100).astype(dtype) * (1 if dtype is bool else 90)
+    hidden = np.zeros(frames[0].shape, bool)
+    hidden[20, 20] = True
+    for kinds in ((0, 1, 0), (1, 0, 1)):
+        mixed = [np.ma.masked_array(frame, hidden) if kind else frame for frame, kind in zip(frames, kinds, strict=True)]
+        all_masked = jacoflow.estimate([np.ma.masked_array(frame, hidden & bool(kind)) for frame, kind in zip(frames, kinds, strict=True)])
+        field = jacoflow.estimate(mixed)
+        np.testing.assert_array_equal(field.flow, all_masked.flow)
+        stream, filter_ = FlowEstimator(), FlowFilter()
+        pushed = [pickle.loads(pickle.dumps(stream)).push(frame) if k == 2 else stream.push(frame) for k, frame in enumerate(mixed)]
+        np.testing.assert_array_equal(pushed[2].flow, field[1].flow)
+        filtered = [filter_.push(frame) for frame in mixed]
+        np.testing.assert_array_equal(filtered[0].status == jacoflow.Status.NON_FINITE, FlowFilter().push(mixed[0]).status == 2)
+        assert filter_.smooth(mixed).shape == (3, 40, 48)
+
+
+def test_a_mask_does_not_make_floats_of_integers():
     masked = np.ma.masked_array(GOOD[1], mask=GOOD[1] > 250)
-    with pytest.raises(TypeError, match="^frames: expected uint8 like the first frame, got float32 .integers with a mask are float32."):
-        jacoflow.flow(GOOD[0], masked)
+    with pytest.raises(TypeError, match="^frames: expected uint8 like the first frame, got float32"):
+        jacoflow.estimate([masked, GOOD[0].astype(np.float32)])
+    with pytest.raises(TypeError, match="^frame: expected uint8 like the first frame, got uint16"):
+        filter_ = FlowFilter()
+        filter_.push(masked)
+        filter_.push(GOOD[0].astype(np.uint16))
 
 
 def test_parameters_of_a_scene_are_numbers():

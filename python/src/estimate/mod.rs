@@ -124,10 +124,10 @@ fn run(
     let mut fields = Growing::None;
     let mut last = None;
     for index in 0..frames.count {
-        let frame = frames.get(index)?;
+        let (frame, dtype) = frames.get(index)?;
         let time = times.get(index).copied();
         let mut field =
-            interruptible(py, || stream.push_at(frame, time).map_err(|error| renamed(error, "time", "frames")))?;
+            interruptible(py, || stream.push_at(frame, dtype, time).map_err(|error| renamed(error, "time", "frames")))?;
         if ends == Ends::Missing && index == 1 && field.is_none() {
             field = interruptible(py, || stream.first_step())?;
         }
@@ -316,8 +316,8 @@ fn estimate_one(frames: &Bound<'_, PyList>, arguments: Arguments) -> Outcome<Flo
         return Err(Error::argument("frames", format!("{needed} frames for this method"), got).into());
     }
     for index in 0..frames.count {
-        let frame = frames.get(index)?;
-        if let Some(field) = interruptible(py, || stream.push_at(frame, None))? {
+        let (frame, dtype) = frames.get(index)?;
+        if let Some(field) = interruptible(py, || stream.push_at(frame, dtype, None))? {
             return Ok(FlowField::any(field));
         }
     }

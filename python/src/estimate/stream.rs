@@ -55,10 +55,10 @@ impl FlowEstimator {
     #[pyo3(signature = (frame, *, time=None))]
     fn push(slf: &Bound<'_, Self>, frame: &Bound<'_, PyAny>, time: Option<f64>) -> Outcome<Option<FlowField>> {
         let (py, mut this) = (slf.py(), alone(slf)?);
-        let frame = arrays::frame_with_gaps("frame", frame, this.colour)?;
+        let (frame, dtype) = arrays::typed_frame("frame", frame, this.colour)?;
         let (stream, mut completed) = (&mut this.stream, false);
         let field = interruptible(py, || {
-            let field = stream.push_at(frame, time).map_err(|error| renamed(error, "frames", "frame"));
+            let field = stream.push_at(frame, dtype, time).map_err(|error| renamed(error, "frames", "frame"));
             completed = true;
             field
         });

@@ -6,14 +6,14 @@ use super::arrays::{self, ColourRule};
 use super::estimate::Growing;
 use super::frame_list::Frames;
 use super::options::{self, Integer, Object, PreprocessOptions};
-use super::{field::FlowField, keywords::constructor, keywords::with_common, samples::is_masked};
+use super::{field::FlowField, keywords::constructor, keywords::with_common};
 use crate::errors::Outcome;
 use crate::image::renamed;
 use crate::interrupt::{alone, interruptible};
 use arguments::{Arguments, filter_options};
 use jacoflow::error::{Error, check_memory};
 use jacoflow::temporal::AnyFlowFilter;
-use jacoflow::types::{AnyFrame, SamplingGrid};
+use jacoflow::types::{SamplingGrid, expect_dtype};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
@@ -40,13 +40,13 @@ impl FlowFilter {
     ///
     /// Where a neighbourhood holds NaN or a masked pixel the filter only predicts, and the result is NaN with
     /// status NON_FINITE. Where the frame contradicts the prediction (black, flashed, dropped) the motion is
-    /// that of the frames before, with status PREDICTED. ValueError for a frame of another size, and for
-    /// masked uint16 frames without `full_scale`; TypeError for another dtype; the filter is then unchanged.
+    /// that of the frames before, with status PREDICTED. ValueError for a frame of another size, TypeError
+    /// for another dtype; the filter is then unchanged.
     fn push(slf: &Bound<'_, Self>, frame: &Bound<'_, PyAny>) -> Outcome<FlowField> {
         let (py, mut this) = (slf.py(), alone(slf)?);
-        let frame = this.frame("frame", frame)?;
+        let (frame, dtype) = arrays::typed_frame("frame", frame, this.colour)?;
         let filter = &mut this.filter;
-        Ok(FlowField::any(py.detach(|| filter.push(&frame)).map_err(named)?))
+        Ok(FlowField::any(py.detach(|| filter.push(&frame, dtype)).map_err(named)?))
     }
 
     /// The fields of all `frames` (T, H, W), a stack of T, each from the frames before and after it.
@@ -62,10 +62,11 @@ impl FlowFilter {
         if frames.count == 0 {
             return Err(Error::argument("frames", "at least 1 frame", "0 frames").into());
         }
-        let mut taken = Vec::new();
+        let (mut taken, mut first) = (Vec::new(), None);
         for index in 0..frames.count {
             py.check_signals()?;
-            let frame = this.frame("frames", &frames.item(index)?)?;
+            let (frame, dtype) = frames.get(index)?;
+            expect_dtype("frames", dtype, first.get_or_insert(dtype))?;
             if index == 0 {
                 // A view of one frame may be of any length.
                 let samples = frame.size().0.checked_mul(frame.size().1).and_then(|n| n.checked_mul(frames.count));
@@ -73,8 +74,9 @@ impl FlowFilter {
             }
             taken.push(frame);
         }
-        let filter = &this.filter;
-        let smoothed = interruptible(py, || filter.smooth(&taken).map_err(|error| renamed(error, "frame", "frames")))?;
+        let (filter, dtype) = (&this.filter, first.unwrap_or_default());
+        let smoothed =
+            interruptible(py, || filter.smooth(&taken, dtype).map_err(|error| renamed(error, "frame", "frames")))?;
         let mut fields = Growing::None;
         for field in smoothed {
             fields.add(field)?;
@@ -156,18 +158,6 @@ impl FlowFilter {
 }
 
 impl FlowFilter {
-    /// A frame as the filter takes it: masked pixels are NaN.
-    fn frame(&self, argument: &str, object: &Bound<'_, PyAny>) -> Outcome<AnyFrame> {
-        let frame = arrays::frame_with_gaps(argument, object, self.colour)?;
-        // With the mask the samples have lost their type, and the scale that it stands for.
-        let full_scale: Option<f64> = self.arguments.profile(object.py())?.1.get("full_scale")?;
-        if full_scale.is_none() && is_masked(object)? && object.getattr("dtype")?.eq("uint16")? {
-            let expected = "the sample value of 255 grey levels (FilterProfile(full_scale=)) for masked uint16 frames";
-            return Err(Error::argument("full_scale", expected, "none").into());
-        }
-        Ok(frame)
-    }
-
     fn from_arguments(py: Python<'_>, arguments: Arguments) -> Outcome<Self> {
         let arguments = arguments.keep(py)?;
         let options = arguments.options(py)?;
