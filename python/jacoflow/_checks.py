@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,21 @@ def positive_integer(name: str, value: Any) -> int:
     if integer < 1:
         raise ValueError(f"{name}: expected a positive integer, got {integer}")
     return integer
+
+
+def switch(name: str, value: Any) -> bool:
+    """True or False, not a value that counts as one of them (no unit); TypeError by name for another."""
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name}: expected True or False, got {value!r}")
+    return bool(value)
+
+
+def known_options(function: str, kind: type, options: Iterable[str]) -> None:
+    """Refuses options that a class does not take (no unit), in the name of the function called."""
+    known = [name for name in inspect.signature(kind).parameters if name not in ("frame", "boxes")]
+    for name in options:
+        if name not in known:
+            raise TypeError(f"{function}() got an unexpected keyword argument {name!r}; expected one of {', '.join(known)}")
 
 
 def numbers(name: str, value: Any, expected: str, shape: tuple[int | None, ...] | None = None) -> NDArray[np.float64]:

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._checks import switch
+
 Array = NDArray[np.float64]
 
 
@@ -88,8 +90,7 @@ class PointMixture(_Base):
         for name, words in self._WORDS.items():
             _demand(name, parameters[name], str, words)
         for name in self._SWITCHES:
-            if not isinstance(parameters[name], bool):
-                raise TypeError(f"{name}: expected True or False, got {parameters[name]!r}")
+            parameters[name] = switch(name, parameters[name])
         return {**parameters, "random_state": _seed(self.random_state)}
 
     def fit_predict(self, X: ArrayLike, y: object = None, sample_weight: ArrayLike | None = None) -> NDArray[np.int64]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._brief import Brief, Rows
+from ._checks import known_options
 from ._jacoflow import _write_particle_tracks
 from ._particle_options import checked_box, checked_boxes, checked_id
 from ._particle_track import Array, ParticleStep, ParticleTracker
@@ -164,6 +165,7 @@ def track_particles(
     UserWarning
         Where an iterable of unknown length ends before a target's start.
     """
+    known_options("track_particles", ParticleTracker, options)
     starts = _starts(boxes)
     total = _length(frames)
     last_start = max(starts, default=0)

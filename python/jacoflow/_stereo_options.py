@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._checks import converted, real_number
+from ._checks import converted, real_number, switch
 
 COUNTS = ("n_components", "random_state", "search", "threads")
 """Counts, no unit; None where the default depends on the mode."""
@@ -100,7 +100,7 @@ def checked_matching(options: Mapping[str, Any]) -> dict[str, Any]:
         elif name in ("disparity_range", "row_range"):
             out[name] = _several(name, value, 2, whole=True)
         elif name in ("subpixel", "left_right_check"):
-            out[name] = _switch(name, value, "True or False")
+            out[name] = switch(name, value)
         elif name == "method" and not isinstance(value, str):
             raise ValueError(f'method: expected "classes" or "sgm", got {value!r}')
     return out
@@ -111,12 +111,6 @@ def warn_of_rows(row_range: tuple[int, int]) -> None:
     least, greatest = row_range
     message = f"row_range: the views hardly agree with any row offset that was searched, {least} to {greatest}, and many disparities are wrong; widen the range or give row_offset"
     warnings.warn(message, UserWarning, stacklevel=3)
-
-
-def _switch(name: str, value: Any, expected: str) -> bool:
-    if not isinstance(value, (bool, np.bool_)) and not (isinstance(value, int) and value in (0, 1)):
-        raise TypeError(f"{name}: expected {expected}, got {value!r}")
-    return bool(value)
 
 
 def whole_number(name: str, value: Any) -> int:

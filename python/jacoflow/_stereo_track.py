@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._brief import Brief, Rows
-from ._checks import real_number
+from ._checks import real_number, switch
 from ._jacoflow import MissingDependencyError, _StereoTracker, _TrackGraph
 from ._stereo_options import StereoCamera, as_array, checked, checked_views, warn_of_rows, whole_number
 
@@ -137,7 +137,7 @@ class TrackGraph:
         time, index = (whole_number("node", at) for at in (t, k))
         if time < 0 or index < 0:
             raise ValueError(f"node: expected a cluster of the graph, got ({t}, {k})")
-        return self._graph.follow(time, index, real_number("threshold", threshold), bool(backward))
+        return self._graph.follow(time, index, real_number("threshold", threshold), switch("backward", backward))
 
     def to_networkx(self, flat: bool = False) -> _networkx.DiGraph[tuple[int, int]]:
         """As a `networkx.DiGraph`: nodes (step, component) with the attributes of `StereoCluster` (px, steps), edges with `forward`, `backward`, 0 to 1, and `score`.

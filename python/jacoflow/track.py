@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._brief import Brief, columns
-from ._checks import numbers, real_number
+from ._checks import known_options, numbers, real_number
 from ._jacoflow import _detect_moving_target, _GaussMarkovFilter, _GradientTracker
 from ._particle_track import ParticleCorners, ParticleStep, ParticleTracker
 from ._particle_tracks import ParticleTrack, ParticleTracks, track_particles
@@ -262,6 +262,7 @@ def track(frames: Iterable[ArrayLike], bbox: ArrayLike | None = None, **options:
 
 def _follow(kind: type[GradientTracker], frames: Iterable[ArrayLike], bbox: ArrayLike | None, options: dict[str, Any]) -> Track:
     """A tracker of a kind through frames."""
+    known_options("track", kind, options)
     try:
         rest = iter(frames)
     except TypeError:

@@ -5,7 +5,7 @@ use super::arrays;
 use super::mixture::{Sample, count, covariance_prior, densities_and_shares, entry, numbers, shares};
 use crate::errors::Outcome;
 use crate::interrupt::interruptible;
-use crate::options::{self, Integer};
+use crate::options::{self, Integer, named};
 use jacoflow::error::Error;
 use jacoflow::mixture::{DirichletMixture, DirichletOptions, Inference, fit_dirichlet, fit_dirichlet_from};
 use jacoflow::parallel::Threads;
@@ -98,7 +98,7 @@ pub fn mixture_dirichlet_densities<'py>(
     py: Python<'py>,
     points: &Bound<'py, PyAny>,
     components: &Bound<'py, PyDict>,
-    threads: Option<Integer>,
+    #[pyo3(from_py_with = named::threads)] threads: Option<Integer>,
 ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let sample = Sample::new(points, None)?;
     let mixture = mixture(components)?;

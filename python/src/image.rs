@@ -33,7 +33,7 @@ pub fn smooth<'py>(
     frame: &Bound<'py, PyAny>,
     #[pyo3(from_py_with = named::blur_sigma)] blur_sigma: f64,
     #[pyo3(from_py_with = named::truncate)] truncate: Option<f64>,
-    threads: Option<Integer>,
+    #[pyo3(from_py_with = named::threads)] threads: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let py = frame.py();
     let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;

@@ -42,7 +42,10 @@ macro_rules! constructor {
         impl $class {
             #[new]
             #[pyo3(signature = (*, $($option = $default),*))]
-            fn new(py: Python<'_>, $($option: $taken),*) -> Outcome<Self> {
+            fn new(
+                py: Python<'_>,
+                $(#[pyo3(from_py_with = $crate::options::named::$option)] $option: $taken),*
+            ) -> Outcome<Self> {
                 Self::from_arguments(py, $name { $($option: $option.into()),* })
             }
         }

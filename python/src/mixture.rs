@@ -4,7 +4,7 @@
 use super::arrays;
 use crate::errors::Outcome;
 use crate::interrupt::interruptible;
-use crate::options::{self, Integer};
+use crate::options::{self, Integer, named};
 use jacoflow::error::{Error, shape_text};
 use jacoflow::mixture::{
     CovariancePrior, Fit, MixtureOptions, Moments, Points, Posterior, Prior, Retained, Seeding, Start, fit, partial_fit,
@@ -226,7 +226,7 @@ pub fn mixture_densities<'py>(
     py: Python<'py>,
     points: &Bound<'py, PyAny>,
     components: &Bound<'py, PyDict>,
-    threads: Option<Integer>,
+    #[pyo3(from_py_with = named::threads)] threads: Option<Integer>,
 ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let sample = Sample::new(points, None)?;
     let components = posterior(components)?;

@@ -31,43 +31,53 @@ impl<'py> FromPyObject<'_, 'py> for Integer {
     }
 }
 
-/// A type of numbers of the core, and what it holds, for messages.
-pub trait Number: Sized {
-    /// What it holds.
-    const RANGE: &str;
+/// A type of arguments.
+pub trait Argument: Sized {
+    /// What it holds, for messages.
+    const EXPECTED: &'static str;
 }
 
-macro_rules! numbers {
-    ($($type:ty: $range:literal),* $(,)?) => {$(
-        impl Number for $type {
-            const RANGE: &str = $range;
+macro_rules! arguments {
+    ($($type:ty: $expected:literal),* $(,)?) => {$(
+        impl Argument for $type {
+            const EXPECTED: &'static str = $expected;
         }
     )*};
 }
-numbers!(
+arguments!(
     usize: "an integer from 0 to 2^64 - 1",
     u64: "an integer from 0 to 2^64 - 1",
     u32: "an integer from 0 to 2^32 - 1",
     i32: "an integer from -2^31 to 2^31 - 1",
     f64: "a number up to 1.8e308",
     (f64, f64): "numbers up to 1.8e308",
+    Integer: "an integer",
+    bool: "True or False",
+    String: "a string",
+    Region: "four integers (x, y, width, height)",
+    Py<PyAny>: "an object",
 );
 
-impl<T: Number> Number for Option<T> {
-    const RANGE: &str = T::RANGE;
+impl Argument for Bound<'_, PyAny> {
+    const EXPECTED: &'static str = Py::<PyAny>::EXPECTED;
 }
 
-/// The argument called `name`: what is no number, or one that its type does not hold, is refused by name.
-fn number<'py, T: Number + FromPyObjectOwned<'py>>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<T> {
+impl<T: Argument> Argument for Option<T> {
+    const EXPECTED: &'static str = T::EXPECTED;
+}
+
+/// The argument called `name`: one of another type, or a number that its type does not hold, is refused by
+/// name.
+fn argument<'py, T: Argument + FromPyObjectOwned<'py>>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<T> {
     value.extract::<T>().map_err(|error| {
         let error: PyErr = error.into();
         if error.is_instance_of::<PyOverflowError>(value.py()) {
             let words = value.str().map_or_else(|_| "a larger one".into(), |text| text.to_string());
             let got: String = words.chars().take(MAX_DIGITS).collect();
-            return PyValueError::new_err(format!("{name}: expected {}, got {got}", T::RANGE));
+            return PyValueError::new_err(format!("{name}: expected {}, got {got}", T::EXPECTED));
         }
         if error.is_instance_of::<PyTypeError>(value.py()) {
-            return PyTypeError::new_err(format!("{name}: expected {}, got {}", T::RANGE, arrays::kind_of(value)));
+            return PyTypeError::new_err(format!("{name}: expected {}, got {}", T::EXPECTED, arrays::kind_of(value)));
         }
         error
     })
@@ -76,18 +86,18 @@ fn number<'py, T: Number + FromPyObjectOwned<'py>>(name: &str, value: &Bound<'py
 /// Digits of a number in a message.
 const MAX_DIGITS: usize = 40;
 
-/// Arguments that are numbers, by their names, for `from_py_with`.
+/// Arguments by their names, for `from_py_with`.
 pub mod named {
-    use super::{Bound, FromPyObjectOwned, Number, PyAny, PyResult, number};
+    use super::{Argument, Bound, FromPyObjectOwned, PyAny, PyResult, argument};
 
     macro_rules! arguments {
         ($($name:ident)*) => {$(
-            pub fn $name<'py, T: Number + FromPyObjectOwned<'py>>(value: &Bound<'py, PyAny>) -> PyResult<T> {
-                number(stringify!($name), value)
+            pub fn $name<'py, T: Argument + FromPyObjectOwned<'py>>(value: &Bound<'py, PyAny>) -> PyResult<T> {
+                argument(stringify!($name), value)
             }
         )*};
     }
-    arguments!(between blur_sigma classes colour_cast duration forward_backward frame_rate index levels max_count max_steps min_distance min_eigenvalue min_step n_components n_near n_particles noise origin prior_radius quality random_state scale search start step t truncate window x y);
+    arguments!(augmented backward batch between blur_sigma classes colour_cast covariance diagnostics dim_x dim_z duration forward_backward fps frame_rate grid index initial left_right_check length_unit levels mask max_count max_steps method min_distance min_eigenvalue min_step n n_components n_near n_particles name noise origin pairs pixel_pitch precision preprocess prior_radius profile quality random_state redraw saturate scale search simd start step subpixel t temporal threads threshold truncate update_first window x y);
 }
 
 /// The argument `region`, any sequence (x, y, width, height), px.
@@ -139,14 +149,10 @@ impl<'py> Group<'py> {
     }
 
     /// The option called `name`, if it was given.
-    pub fn get<T: FromPyObjectOwned<'py>>(&self, name: &str) -> Outcome<Option<T>> {
+    pub fn get<T: Argument + FromPyObjectOwned<'py>>(&self, name: &str) -> Outcome<Option<T>> {
         let Some(object) = &self.0 else { return Ok(None) };
-        let Some(value) = object.getattr_opt(name)?.filter(|value| !value.is_none()) else { return Ok(None) };
-        value.extract().map(Some).map_err(|error| {
-            let message = Into::<PyErr>::into(error).value(object.py()).to_string();
-            let is_named = message.starts_with(&format!("{name}: "));
-            PyTypeError::new_err(if is_named { message } else { format!("{name}: {message}") }).into()
-        })
+        let value = object.getattr_opt(name)?.filter(|value| !value.is_none());
+        Ok(value.map(|value| argument(name, &value)).transpose()?)
     }
 }
 
@@ -225,7 +231,7 @@ pub fn neighbourhood(value: &Bound<'_, PyAny>) -> Outcome<Neighbourhood> {
 
 /// A number that may be absent.
 pub fn real(py: Python<'_>, name: &str, value: &Object) -> Outcome<Option<f64>> {
-    Ok(value.as_ref().map(|value| number(name, value.bind(py))).transpose()?)
+    Ok(value.as_ref().map(|value| argument(name, value.bind(py))).transpose()?)
 }
 
 /// `fps`, as seconds between frames.

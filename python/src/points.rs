@@ -50,7 +50,7 @@ pub fn corners<'py>(
     #[pyo3(from_py_with = named::min_distance)] min_distance: f64,
     #[pyo3(from_py_with = named::window)] window: usize,
     existing: Option<Bound<'py, PyAny>>,
-    threads: Option<Integer>,
+    #[pyo3(from_py_with = named::threads)] threads: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let py = frame.py();
     let threads = options::threads(threads)?;
@@ -104,7 +104,7 @@ pub fn point_flow<'py>(
     #[pyo3(from_py_with = named::min_step)] min_step: f64,
     #[pyo3(from_py_with = named::forward_backward)] forward_backward: Option<f64>,
     #[pyo3(from_py_with = named::min_eigenvalue)] min_eigenvalue: Option<f64>,
-    threads: Option<Integer>,
+    #[pyo3(from_py_with = named::threads)] threads: Option<Integer>,
 ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let py = before.py();
     let threads = options::threads(threads)?;

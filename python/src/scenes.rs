@@ -219,7 +219,7 @@ impl Sensor {
     fn new(
         #[pyo3(from_py_with = named::noise)] noise: Option<f64>,
         rounding: Option<&str>,
-        saturate: Option<bool>,
+        #[pyo3(from_py_with = named::saturate)] saturate: Option<bool>,
         #[pyo3(from_py_with = named::random_state)] random_state: Option<u64>,
     ) -> Outcome<Self> {
         let default = CoreSensor::default();

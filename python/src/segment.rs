@@ -3,7 +3,7 @@
 use super::{arrays, samples::exact_samples};
 use crate::errors::Outcome;
 use crate::interrupt::interruptible;
-use crate::options::{self, Integer};
+use crate::options::{self, Integer, named};
 use jacoflow::error::{Error, Result, shape_text};
 use jacoflow::parallel::Threads;
 use jacoflow::segment::{EdgeWeight, SegmentImage, SegmentOptions, felzenszwalb, region_means};
@@ -49,7 +49,7 @@ pub fn segment_felzenszwalb<'py>(
     scale: f64,
     sigma: f64,
     min_size: i64,
-    threads: Option<Integer>,
+    #[pyo3(from_py_with = named::threads)] threads: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let py = image.py();
     let threads = options::threads(threads)?;

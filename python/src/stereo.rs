@@ -44,6 +44,7 @@ struct Search {
     #[pyo3(from_py_with = named::window)]
     window: usize,
     min_support: f64,
+    #[pyo3(from_py_with = named::threads)]
     threads: Option<Integer>,
 }
 
@@ -53,7 +54,9 @@ struct Search {
 struct Matching<'py> {
     method: String,
     row_offset: Option<f64>,
+    #[pyo3(from_py_with = named::subpixel)]
     subpixel: bool,
+    #[pyo3(from_py_with = named::left_right_check)]
     left_right_check: bool,
     prior: Option<Bound<'py, PyAny>>,
     #[pyo3(from_py_with = named::prior_radius)]
@@ -140,7 +143,7 @@ pub fn edge_pixels<'py>(
     view: &Bound<'py, PyAny>,
     blur_sigma: f64,
     threshold: f64,
-    threads: Option<Integer>,
+    #[pyo3(from_py_with = named::threads)] threads: Option<Integer>,
 ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     let py = view.py();
     let threads = options::threads(threads)?;

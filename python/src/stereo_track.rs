@@ -8,6 +8,7 @@ use super::arrays::{self, ColourRule};
 use super::stereo::in_levels;
 use crate::errors::Outcome;
 use crate::interrupt::Held;
+use crate::options::named;
 use jacoflow::error::Error;
 use jacoflow::track::GreyLevels;
 use jacoflow::track::stereo::{EdgePoints, Node, Step, StereoTracker, TrackGraph};
@@ -231,7 +232,13 @@ impl PyTrackGraph {
     }
 
     /// Clusters (time, index) reached from one along arcs with at least this score.
-    fn follow(&self, time: usize, index: usize, threshold: f64, backward: bool) -> Outcome<Vec<(usize, usize)>> {
+    fn follow(
+        &self,
+        time: usize,
+        index: usize,
+        threshold: f64,
+        #[pyo3(from_py_with = named::backward)] backward: bool,
+    ) -> Outcome<Vec<(usize, usize)>> {
         Ok(self.0.follow(time, index, threshold, backward)?)
     }
 }

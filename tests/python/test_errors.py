@@ -346,6 +346,61 @@ def test_a_mask_does_not_make_floats_of_integers():
         filter_.push(GOOD[0].astype(np.uint16))
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("threads", 1.5, "expected an integer, got float"),
+        ("threads", "2", "expected an integer, got str"),
+        ("covariance", 1, "expected True or False, got int"),
+        ("covariance", "yes", "expected True or False, got str"),
+        ("diagnostics", 1, "expected True or False, got int"),
+        ("precision", 32, "expected a string, got int"),
+        ("length_unit", 1, "expected a string, got int"),
+        ("simd", True, "expected a string, got bool"),
+    ],
+)
+def test_options_of_another_type_are_named(option, value, message):
+    calls = [lambda: jacoflow.estimate(GOOD, **{option: value}), lambda: jacoflow.flow(*GOOD, **{option: value})]
+    calls += [lambda: FlowEstimator(**{option: value})]
+    if option != "diagnostics":
+        calls += [lambda: FlowFilter(**{option: value})]
+    for call in calls:
+        with pytest.raises(TypeError, match=f"^{option}: {message}"):
+            call()
+
+
+def test_switches_are_booleans_of_python_or_numpy():
+    for value in (1, "yes", 0.0, np.int64(1)):
+        with pytest.raises(TypeError, match="^pairs: expected True or False, got "):
+            jacoflow.estimate(GOOD[:2], pairs=value)
+        with pytest.raises(TypeError, match="^subpixel: expected True or False, got "):
+            jacoflow.stereo.edge_disparity(np.zeros((24, 24)), np.zeros((24, 24)), subpixel=value)
+    frames = scenes.Scene("affine", width=48, height=40).frames(2)
+    field = jacoflow.estimate(frames, pairs=np.True_, covariance=np.False_, diagnostics=np.True_)
+    assert field.shape == (1, 40, 48) and field.covariance is None
+    with pytest.raises(TypeError, match="^forgetting: expected a number .*, got str"):
+        FlowEstimator(temporal=jacoflow.Recursive(forgetting="x"))
+
+
+def test_what_is_measured_is_called_name():
+    field = jacoflow.flow(*scenes.Scene("affine", width=48, height=40).frames(2))
+    for call in (field.measure, field.region_mean, field.value, field.std, field.unit):
+        with pytest.raises(TypeError, match="^name: expected a string, got int"):
+            call(3)
+    for call in (field.measure, field.region_mean, field.value, field.std):
+        with pytest.raises(ValueError, match="^name: expected a field with a frame period .fps. for rpm, got one without$"):
+            call("rpm")
+    with pytest.raises(ValueError, match="frame period .fps. for rpm"):
+        field.rpm
+
+
+def test_an_option_that_a_tracker_does_not_have_is_of_the_function_called():
+    with pytest.raises(TypeError, match=r"^track\(\) got an unexpected keyword argument 'box'; expected one of bbox, center, model, camera$"):
+        jacoflow.track.track(np.zeros((2, 40, 40), np.uint8), box=(1, 2, 9, 9))
+    with pytest.raises(TypeError, match=r"^track_particles\(\) got an unexpected keyword argument 'box'; expected one of mode, "):
+        jacoflow.track.track_particles(np.zeros((2, 40, 40, 3), np.uint8), [(1, 2, 9, 9)], box=1)
+
+
 def test_parameters_of_a_scene_are_numbers():
     with pytest.raises(TypeError, match="^u_x: expected a number, got <class 'str'>"):
         scenes.Scene("affine", u_x="x")

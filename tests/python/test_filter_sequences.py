@@ -388,3 +388,15 @@ def test_filters_with_functions_pickle(make):
     for name in ("x", "P", "Q", "R", "y", "S", "K", "log_likelihood", "mahalanobis", "failed"):
         assert_array_equal(getattr(other, name), getattr(one, name))
     assert repr(other) == repr(one) and len(repr(one)) < 100
+
+
+def test_sizes_and_switches_are_named():
+    points = MerweScaledSigmaPoints(2)
+    for make in (KalmanFilter, ExtendedKalmanFilter, lambda *sizes, **rest: UnscentedKalmanFilter(*sizes, 1.0, None, None, points, **rest)):
+        for arguments, rest, name in (((2.5, 1), {}, "dim_x"), ((2, "1"), {}, "dim_z"), ((2, 1), {"batch": 1.5}, "batch")):
+            with pytest.raises(TypeError, match=f"^{name}: expected an integer, got (float|str)"):
+                make(*arguments, **rest)
+    with pytest.raises(TypeError, match="^update_first: expected True or False, got int"):
+        KalmanFilter(2, 1).batch_filter([1.0], update_first=1)
+    with pytest.raises(TypeError, match="^redraw: expected True or False, got int"):
+        UnscentedKalmanFilter(2, 1, 1.0, None, None, points, redraw=1)

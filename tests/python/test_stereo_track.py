@@ -167,6 +167,8 @@ def test_tracks_of_the_graph_reach_from_end_to_end():
     first = min(back)
     assert (4, last) in graph.follow(*first)
     assert graph.follow(4, last, threshold=2.0, backward=True) == [(4, last)]
+    with pytest.raises(TypeError, match="^backward: expected True or False, got 1$"):
+        graph.follow(4, last, backward=1)
     assert all(0 <= forward <= 1 and 0 <= backward <= 1 for forward, backward in graph.arcs.values())
     assert np.allclose(graph.nodes[first].next_velocity, [-3, 0, 0], atol=0.1)
 

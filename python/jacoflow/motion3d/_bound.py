@@ -8,8 +8,9 @@ from typing import Literal
 from numpy.typing import ArrayLike
 
 from .._brief import Brief
+from .._checks import switch
 from .._jacoflow import _motion3d_bound
-from ._checks import Array, layout, switch
+from ._checks import Array, layout
 
 
 @dataclass(frozen=True, eq=False, repr=False)

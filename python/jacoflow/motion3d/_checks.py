@@ -59,13 +59,6 @@ def whole(name: str, value: int) -> int:
     return integer
 
 
-def switch(name: str, value: bool) -> bool:
-    """True or False, not a value with a truth: any text is true."""
-    if not isinstance(value, bool | np.bool_):
-        raise TypeError(f"{name}: expected True or False, got {value!r}")
-    return bool(value)
-
-
 def optional(convert: Callable[[str, Any], Any]) -> Callable[[str, Any], Any]:
     """The check of an option that may be None."""
     return lambda name, value: None if value is None else convert(name, value)

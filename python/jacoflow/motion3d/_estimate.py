@@ -7,8 +7,9 @@ from typing import Any, Literal
 
 from numpy.typing import ArrayLike
 
+from .._checks import switch
 from .._jacoflow import _motion3d_estimate
-from ._checks import layout, number, optional, pair, switch, whole, word
+from ._checks import layout, number, optional, pair, whole, word
 from ._results import MotionEstimate, estimate_of
 
 OPTIONS: dict[str, tuple[object, Callable[[str, Any], Any]]] = {

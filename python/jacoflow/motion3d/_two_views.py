@@ -6,8 +6,9 @@ from typing import Literal
 
 from numpy.typing import ArrayLike
 
+from .._checks import switch
 from .._jacoflow import _motion3d_essential, _motion3d_predict
-from ._checks import Array, kind, switch, word
+from ._checks import Array, kind, word
 from ._results import MotionEstimate, MotionSolution
 
 

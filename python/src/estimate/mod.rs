@@ -5,7 +5,7 @@ mod stream;
 
 use super::field::{FlowField, Packed};
 use super::keywords::with_common;
-use super::options::{Integer, Object};
+use super::options::{Integer, Object, named};
 use super::progress::Reporter;
 use crate::errors::Outcome;
 use crate::frame_list::Frames;
@@ -231,8 +231,8 @@ macro_rules! define_estimate {
             frames: &Bound<'_, PyAny>,
             more: &Bound<'_, PyTuple>,
             ends: &str,
-            pairs: bool,
-            $($option: $taken,)*
+            #[pyo3(from_py_with = named::pairs)] pairs: bool,
+            $(#[pyo3(from_py_with = named::$option)] $option: $taken,)*
             progress: Option<&Bound<'_, PyAny>>,
         ) -> Outcome<FlowField> {
             if !more.is_empty() {
@@ -267,7 +267,7 @@ macro_rules! define_estimate {
             first: &Bound<'_, PyAny>,
             second: &Bound<'_, PyAny>,
             third: Option<&Bound<'_, PyAny>>,
-            $($option: $taken,)*
+            $(#[pyo3(from_py_with = named::$option)] $option: $taken,)*
         ) -> Outcome<FlowField> {
             let frames: Vec<_> = [Some(first), Some(second), third].into_iter().flatten().collect();
             estimate_one(&PyList::new(first.py(), frames)?, Arguments { $($option: $option.into()),* })

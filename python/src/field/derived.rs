@@ -1,6 +1,7 @@
 //! Parameters and derived quantities by name.
 
 use crate::errors::Outcome;
+use crate::image::renamed;
 use jacoflow::error::{Error, Result};
 use jacoflow::flow::derived::{Aggregate, Measured, Quantity, parameter_mean, plane, planes, region_mean};
 use jacoflow::math::Real;
@@ -12,7 +13,7 @@ use pyo3::types::{IntoPyDict, PyDict};
 pub fn value<T: Real>(field: &FlowField<T>, name: &str) -> Result<Vec<f64>> {
     match field.plane(name) {
         Some(plane) => Ok(plane.iter().map(|v| v.to_f64()).collect()),
-        None => plane(field, quantity(&field.layout, name)?),
+        None => plane(field, quantity(&field.layout, name)?).map_err(by_name),
     }
 }
 
@@ -23,7 +24,7 @@ pub fn std<T: Real>(field: &FlowField<T>, name: &str) -> Result<Vec<f64>> {
     }
     match field.standard_deviation(name) {
         Some(plane) => Ok(plane.iter().map(|v| v.to_f64()).collect()),
-        None => Ok(planes(field, quantity(&field.layout, name)?)?.1.unwrap_or_default()),
+        None => Ok(planes(field, quantity(&field.layout, name)?).map_err(by_name)?.1.unwrap_or_default()),
     }
 }
 
@@ -46,9 +47,14 @@ pub fn region<T: Real>(
     let mean = if field.plane(name).is_some() {
         parameter_mean(field, name, region, aggregate)?
     } else {
-        region_mean(field, quantity(&field.layout, name)?, region, aggregate)?
+        region_mean(field, quantity(&field.layout, name)?, region, aggregate).map_err(by_name)?
     };
     Ok((mean.value, mean.std, mean.count))
+}
+
+/// The same error with the argument called as Python calls it.
+pub fn by_name(error: Error) -> Error {
+    renamed(error, "quantity", "name")
 }
 
 /// The parameter of affine motion or the derived quantity called `name`.

@@ -1,5 +1,6 @@
 //! `Measurement`: a quantity of the motion that a region follows.
 
+use super::derived::by_name;
 use crate::arrays;
 use crate::errors::Outcome;
 use jacoflow::flow::derived::{Measured, RegionMotion, RegionStatus, fit_region};
@@ -69,7 +70,7 @@ impl Measurement {
         at: Option<(f64, f64)>,
     ) -> jacoflow::Result<()> {
         let fit = fit_region(field, region, at)?;
-        let (value, std) = measured.of_region(field, &fit)?;
+        let (value, std) = measured.of_region(field, &fit).map_err(by_name)?;
         self.rows.push(Row { value, std, fit });
         Ok(())
     }

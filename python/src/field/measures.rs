@@ -2,7 +2,7 @@
 
 use super::{FlowField, Measurement, Store, derived, each};
 use crate::errors::Outcome;
-use crate::{arrays, keywords::getters, region};
+use crate::{arrays, keywords::getters, options::named, region};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
@@ -10,54 +10,49 @@ getters! {
     FlowField;
     /// Divergence L_xx + L_yy of the rate L of the step, float64 array (..., H, W), 1/frame, or 1/s with a
     /// frame period.
-    divergence(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "divergence");
+    divergence(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "divergence");
     /// Curl L_yx - L_xy, float64 array (..., H, W), 1/frame, or 1/s with a frame period; positive turns
     /// clockwise on the screen.
-    curl(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "curl");
+    curl(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "curl");
     /// Shear sqrt((L_xx - L_yy)^2 + (L_xy + L_yx)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame
     /// period.
-    shear_magnitude(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "shear_magnitude");
+    shear_magnitude(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "shear_magnitude");
     /// Direction of the greatest stretch, atan2(L_xy + L_yx, L_xx - L_yy) / 2, float64 array (..., H, W),
     /// rad in (-pi/2, pi/2], from x towards y.
-    shear_axis(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "shear_axis");
+    shear_axis(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "shear_axis");
     /// Stretch L_xx along x, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
-    strain_xx(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "strain_xx");
+    strain_xx(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "strain_xx");
     /// Stretch L_yy along y, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
-    strain_yy(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "strain_yy");
+    strain_yy(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "strain_yy");
     /// Shear strain (L_xy + L_yx) / 2, float64 array (..., H, W), 1/frame, or 1/s with a frame period.
-    strain_xy(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "strain_xy");
+    strain_xy(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "strain_xy");
     /// Angular velocity (L_yx - L_xy) / 2, float64 array (..., H, W), rad/frame, or rad/s with a frame
     /// period.
-    angular_velocity(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "angular_velocity");
+    angular_velocity(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "angular_velocity");
     /// Angular velocity, float64 array (..., H, W), revolutions per minute; ValueError without fps or
     /// frame_period.
-    rpm(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "rpm");
+    rpm(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "rpm");
     /// Distance of the point that does not move, float64 array (..., H, W), px, or units of the pixel pitch.
-    centre_distance(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "centre_distance");
+    centre_distance(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "centre_distance");
     /// Time from the field's frame to contact with a surface parallel to the image, float64 array (..., H,
     /// W), frames, or s with a frame period; negative while it recedes.
-    time_to_contact(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "time_to_contact");
+    time_to_contact(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "time_to_contact");
     /// Speed sqrt(u^2 + v^2), float64 array (..., H, W), px/frame, or px/s with a frame period.
-    speed(this, slf) -> Outcome<Bound<'py, PyAny>> = this.value(slf.py(), "speed");
+    speed(this, slf) -> Outcome<Bound<'py, PyAny>> = this.plane(slf.py(), "speed");
     /// The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units of
     /// the pixel pitch.
     ///
     /// It need not be in the picture. NaN where there is none. `value` and `std` take its parts,
     /// rotation_centre_x and rotation_centre_y.
     rotation_centre(this, slf) -> Outcome<Bound<'py, PyAny>> = {
-        let both = (this.value(slf.py(), "rotation_centre_x")?, this.value(slf.py(), "rotation_centre_y")?);
+        let both = (this.plane(slf.py(), "rotation_centre_x")?, this.plane(slf.py(), "rotation_centre_y")?);
         Ok(slf.py().import("numpy")?.call_method1("stack", (both, -1))?)
     };
 }
 
-#[pymethods]
 impl FlowField {
-    /// The parameter or derived quantity `name`, float64 array (..., H, W), in the unit that `unit(name)`
-    /// gives.
-    ///
-    /// Names are those of `parameters` and of `quantities()`. ValueError for another name, and for rpm
-    /// without a frame period.
-    fn value<'py>(&self, py: Python<'py>, name: &str) -> Outcome<Bound<'py, PyAny>> {
+    /// The parameter or derived quantity `name` at every site.
+    fn plane<'py>(&self, py: Python<'py>, name: &str) -> Outcome<Bound<'py, PyAny>> {
         each!(self.store, packed => {
             let mut data = Vec::new();
             for index in 0..self.count {
@@ -67,17 +62,37 @@ impl FlowField {
             arrays::owned(py, &self.shape(), data)
         })
     }
+}
+
+#[pymethods]
+impl FlowField {
+    /// The parameter or derived quantity `name`, float64 array (..., H, W), in the unit that `unit(name)`
+    /// gives.
+    ///
+    /// Names are those of `parameters` and of `quantities()`. ValueError for another name, and for rpm
+    /// without a frame period.
+    fn value<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = named::name)] name: String,
+    ) -> Outcome<Bound<'py, PyAny>> {
+        self.plane(py, &name)
+    }
 
     /// Standard deviation of the parameter or derived quantity `name`, float64 array (..., H, W), in its
     /// unit: sqrt(g^T Cov g) with its gradient g.
     ///
     /// ValueError for another name and for a field without covariance.
-    fn std<'py>(&self, py: Python<'py>, name: &str) -> Outcome<Bound<'py, PyAny>> {
+    fn std<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = named::name)] name: String,
+    ) -> Outcome<Bound<'py, PyAny>> {
         each!(self.store, packed => {
             let mut data = Vec::new();
             for index in 0..self.count {
                 let field = self.core(packed, index);
-                data.extend(py.detach(|| derived::std(&field, name))?);
+                data.extend(py.detach(|| derived::std(&field, &name))?);
             }
             arrays::owned(py, &self.shape(), data)
         })
@@ -99,7 +114,7 @@ impl FlowField {
     fn region_mean(
         &self,
         py: Python<'_>,
-        name: &str,
+        #[pyo3(from_py_with = named::name)] name: String,
         region: Option<&Bound<'_, PyAny>>,
         aggregate: Option<&str>,
     ) -> Outcome<(f64, f64, usize)> {
@@ -111,7 +126,7 @@ impl FlowField {
         let region = region::parse(region)?;
         each!(self.store, packed => {
             let field = self.core(packed, 0);
-            Ok(py.detach(|| derived::region(&field, name, region.as_ref(), aggregate))?)
+            Ok(py.detach(|| derived::region(&field, &name, region.as_ref(), aggregate))?)
         })
     }
 
@@ -136,14 +151,14 @@ impl FlowField {
     fn measure(
         &self,
         py: Python<'_>,
-        name: &str,
+        #[pyo3(from_py_with = named::name)] name: String,
         region: Option<&Bound<'_, PyAny>>,
         at: Option<&Bound<'_, PyAny>>,
     ) -> Outcome<Measurement> {
-        let (measured, unit) = (derived::measured(self.layout(), name)?, derived::unit(self.layout(), name)?);
+        let (measured, unit) = (derived::measured(self.layout(), &name)?, derived::unit(self.layout(), &name)?);
         let region = region::parse(region)?;
         let at = at.map(|at| arrays::pair("at", "a pixel (x, y)", at)).transpose()?;
-        let mut measurement = Measurement::new(name, unit, self.stack);
+        let mut measurement = Measurement::new(&name, unit, self.stack);
         each!(self.store, packed => {
             for index in 0..self.count {
                 let field = self.core(packed, index);
@@ -156,7 +171,7 @@ impl FlowField {
 
     /// Unit of the parameter or derived quantity `name`: lengths in px or `length_unit`, times in frames, or
     /// in seconds with a frame period. ValueError for another name.
-    fn unit(&self, name: &str) -> Outcome<String> {
-        Ok(derived::unit(self.layout(), name)?)
+    fn unit(&self, #[pyo3(from_py_with = named::name)] name: String) -> Outcome<String> {
+        Ok(derived::unit(self.layout(), &name)?)
     }
 }

@@ -4,7 +4,7 @@ use super::callback::{Callbacks, entry, lead, lock};
 use super::gaussian::{GaussianFilter, sizes};
 use super::sequence::{Record, filtered, for_each_time, items, noises, smoothed};
 use crate::errors::Outcome;
-use crate::options::Integer;
+use crate::options::{Integer, named};
 use jacoflow::filter::ExtendedFilter as Core;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -45,9 +45,9 @@ impl ExtendedKalmanFilter {
     #[pyo3(signature = (dim_x, dim_z, *, batch=None, residual_x=None, residual_z=None, state_add=None))]
     fn new(
         py: Python<'_>,
-        dim_x: Integer,
-        dim_z: Integer,
-        batch: Option<Integer>,
+        #[pyo3(from_py_with = named::dim_x)] dim_x: Integer,
+        #[pyo3(from_py_with = named::dim_z)] dim_z: Integer,
+        #[pyo3(from_py_with = named::batch)] batch: Option<Integer>,
         residual_x: Option<Py<PyAny>>,
         residual_z: Option<Py<PyAny>>,
         state_add: Option<Py<PyAny>>,

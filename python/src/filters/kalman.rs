@@ -6,7 +6,7 @@ use super::sequence::{Record, filtered, for_each_time, items, noises, smoothed};
 use crate::arrays;
 use crate::errors::Outcome;
 use crate::interrupt::interruptible;
-use crate::options::Integer;
+use crate::options::{Integer, named};
 use jacoflow::error::Error;
 use jacoflow::filter::KalmanFilter as Core;
 use pyo3::prelude::*;
@@ -47,9 +47,9 @@ impl KalmanFilter {
     #[pyo3(signature = (dim_x, dim_z, *, batch=None, residual_x=None, residual_z=None, state_add=None))]
     fn new(
         py: Python<'_>,
-        dim_x: Integer,
-        dim_z: Integer,
-        batch: Option<Integer>,
+        #[pyo3(from_py_with = named::dim_x)] dim_x: Integer,
+        #[pyo3(from_py_with = named::dim_z)] dim_z: Integer,
+        #[pyo3(from_py_with = named::batch)] batch: Option<Integer>,
         residual_x: Option<Py<PyAny>>,
         residual_z: Option<Py<PyAny>>,
         state_add: Option<Py<PyAny>>,
@@ -146,7 +146,7 @@ impl KalmanFilter {
         Qs: Option<&Bound<'py, PyAny>>,
         Hs: Option<&Bound<'py, PyAny>>,
         Rs: Option<&Bound<'py, PyAny>>,
-        update_first: bool,
+        #[pyo3(from_py_with = named::update_first)] update_first: bool,
     ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, base, zs) = (slf.py(), slf.as_super().get(), items("zs", zs)?);
         let all = |name, sequence| for_each_time(name, sequence, zs.len());

@@ -5,7 +5,7 @@ use super::gaussian::{GaussianFilter, sizes};
 use super::sequence::{Record, filtered, for_each_time, items, noises, smoothed};
 use super::sigma_points::MerweScaledSigmaPoints;
 use crate::errors::Outcome;
-use crate::options::Integer;
+use crate::options::{Integer, named};
 use crate::{arrays, keywords::getters};
 use jacoflow::error::{Error, shape_text};
 use jacoflow::filter::UnscentedFilter as Core;
@@ -72,8 +72,8 @@ impl UnscentedKalmanFilter {
     ))]
     fn new(
         py: Python<'_>,
-        dim_x: Integer,
-        dim_z: Integer,
+        #[pyo3(from_py_with = named::dim_x)] dim_x: Integer,
+        #[pyo3(from_py_with = named::dim_z)] dim_z: Integer,
         dt: &Bound<'_, PyAny>,
         hx: Py<PyAny>,
         fx: Py<PyAny>,
@@ -83,9 +83,9 @@ impl UnscentedKalmanFilter {
         residual_x: Option<Py<PyAny>>,
         residual_z: Option<Py<PyAny>>,
         state_add: Option<Py<PyAny>>,
-        batch: Option<Integer>,
-        augmented: bool,
-        redraw: bool,
+        #[pyo3(from_py_with = named::batch)] batch: Option<Integer>,
+        #[pyo3(from_py_with = named::augmented)] augmented: bool,
+        #[pyo3(from_py_with = named::redraw)] redraw: bool,
     ) -> Outcome<PyClassInitializer<Self>> {
         let (dim_x, dim_z, batch) = sizes(dim_x, dim_z, batch)?;
         let dt = step("dt", dt)?;

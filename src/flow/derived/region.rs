@@ -26,8 +26,8 @@ pub fn planes<T: Real>(field: &FlowField<T>, quantity: Quantity) -> Result<(Vec<
 /// [`Error::Argument`] naming `quantity` for one that the field cannot give.
 pub(super) fn check<T>(field: &FlowField<T>, quantity: Quantity) -> Result<()> {
     if quantity.needs_fps() && field.layout.units.frame_period.is_none() {
-        let expected = "a frame period (frames per second) to be given with rpm";
-        return Err(Error::argument("quantity", expected, "a field without one"));
+        let expected = "a field with a frame period (fps) for rpm";
+        return Err(Error::argument("quantity", expected, "one without"));
     }
     if quantity.needs_jacobian() && !field.layout.parameters.iter().any(|p| p == "u_x") {
         return Err(Error::argument(

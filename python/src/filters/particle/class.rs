@@ -4,7 +4,7 @@ use super::selection::seed;
 use crate::arrays;
 use crate::errors::Outcome;
 use crate::filters::callback::{entry, lead, lock, read, write};
-use crate::options::{Integer, count, threads};
+use crate::options::{Integer, count, named, threads};
 use jacoflow::error::Error;
 use jacoflow::filter::check_mean;
 use jacoflow::filter::particle::ParticleFilter as Core;
@@ -119,12 +119,12 @@ impl ParticleFilter {
     #[pyo3(signature = (dim_x, n_particles, *, batch=None, random_state=None, ids=None, threads=None))]
     fn new(
         py: Python<'_>,
-        dim_x: Integer,
-        n_particles: Integer,
-        batch: Option<Integer>,
-        random_state: Option<Integer>,
+        #[pyo3(from_py_with = named::dim_x)] dim_x: Integer,
+        #[pyo3(from_py_with = named::n_particles)] n_particles: Integer,
+        #[pyo3(from_py_with = named::batch)] batch: Option<Integer>,
+        #[pyo3(from_py_with = named::random_state)] random_state: Option<Integer>,
         ids: Option<&Bound<'_, PyAny>>,
-        threads: Option<Integer>,
+        #[pyo3(from_py_with = named::threads)] threads: Option<Integer>,
     ) -> Outcome<Self> {
         let batch = batch.map(|batch| count("batch", batch)).transpose()?;
         let (dim_x, n_particles) = (count("dim_x", dim_x)?, count("n_particles", n_particles)?);

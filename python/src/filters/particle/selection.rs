@@ -1,7 +1,7 @@
 //! `resample`: a selection by itself.
 
 use crate::errors::Outcome;
-use crate::{arrays, options::Integer, options::count};
+use crate::{arrays, image::renamed, options::Integer, options::count, options::named};
 use jacoflow::error::{Error, shape_text};
 use jacoflow::filter::particle::{Resampling, resample_indices};
 use jacoflow::math::random::CounterRng;
@@ -22,12 +22,12 @@ use std::cell::Cell;
 pub fn resample<'py>(
     py: Python<'py>,
     weights: &Bound<'py, PyAny>,
-    n: Option<Integer>,
+    #[pyo3(from_py_with = named::n)] n: Option<Integer>,
     scheme: &str,
     uniforms: Option<&Bound<'py, PyAny>>,
-    random_state: Option<Integer>,
+    #[pyo3(from_py_with = named::random_state)] random_state: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {
-    let scheme = Resampling::parse(scheme)?;
+    let scheme = Resampling::parse(scheme).map_err(|error| renamed(error, "resampling", "scheme"))?;
     let weights = checked_weights(weights)?;
     let number = n.map(|n| count("n", n)).transpose()?.unwrap_or(weights.len());
     let mut indices = Vec::new();

@@ -4,7 +4,8 @@ use super::class::ParticleFilter;
 use crate::arrays;
 use crate::errors::Outcome;
 use crate::filters::callback::{Callbacks, lead, lock};
-use crate::options::{Integer, count};
+use crate::image::renamed;
+use crate::options::{Integer, count, named};
 use jacoflow::error::{Error, shape_text};
 use jacoflow::filter::particle::{ParticleFilter as Core, Resampling};
 use pyo3::prelude::*;
@@ -139,10 +140,10 @@ impl ParticleFilter {
         &self,
         py: Python<'py>,
         scheme: &str,
-        threshold: Option<f64>,
-        n_particles: Option<Integer>,
+        #[pyo3(from_py_with = named::threshold)] threshold: Option<f64>,
+        #[pyo3(from_py_with = named::n_particles)] n_particles: Option<Integer>,
     ) -> Outcome<Bound<'py, PyAny>> {
-        let scheme = Resampling::parse(scheme)?;
+        let scheme = Resampling::parse(scheme).map_err(|error| renamed(error, "resampling", "scheme"))?;
         let n_particles = n_particles.map(|number| count("n_particles", number)).transpose()?;
         let mut core = lock(&self.core)?;
         self.give(py, &mut core)?;
