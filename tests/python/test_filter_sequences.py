@@ -309,7 +309,7 @@ def test_sequences_of_wrong_length_are_refused_by_name():
     ours = linear_pair()
     for call, name in (
         (lambda: ours.batch_filter([1.0, 2.0], Rs=[0.1]), "Rs"),
-        (lambda: ours.batch_filter([1.0, [2.0, 3.0]]), "z"),
+        (lambda: ours.batch_filter([1.0, [2.0, 3.0]]), "zs"),
         (lambda: ours.rts_smoother(np.zeros((3, 1)), np.zeros((3, 2, 2))), "Xs"),
         (lambda: ours.rts_smoother(np.zeros((3, 2)), np.zeros((2, 2, 2))), "Ps"),
         (lambda: ours.rts_smoother(np.zeros((3, 2)), -np.ones((3, 2, 2))), "Ps"),
@@ -388,6 +388,18 @@ def test_filters_with_functions_pickle(make):
     for name in ("x", "P", "Q", "R", "y", "S", "K", "log_likelihood", "mahalanobis", "failed"):
         assert_array_equal(getattr(other, name), getattr(one, name))
     assert repr(other) == repr(one) and len(repr(one)) < 100
+
+
+@pytest.mark.parametrize("name", ["Fs", "Hs", "Qs", "Rs"])
+def test_items_of_a_sequence_are_refused_by_its_name_before_the_first_step(name):
+    ours = KalmanFilter(2, 1)
+    for item, error in ((np.ones((3, 3)), ValueError), ("x", TypeError)):
+        with pytest.raises(error, match=f"^{name}: expected"):
+            ours.batch_filter([1.0, 2.0], **{name: [None, item]})
+    assert_array_equal(ours.P, np.eye(2))
+    if name == "Qs":
+        with pytest.raises(ValueError, match="^Qs: expected"):
+            ours.rts_smoother(np.zeros((2, 2)), np.zeros((2, 2, 2)), Qs=[None, np.ones((3, 3))])
 
 
 def test_sizes_and_switches_are_named():

@@ -2,7 +2,7 @@
 
 use super::callback::{Callbacks, entry, lead, lock};
 use super::gaussian::{GaussianFilter, sizes};
-use super::sequence::{Record, filtered, for_each_time, items, noises, smoothed};
+use super::sequence::{Record, check_each, filtered, for_each_time, items, noises, smoothed};
 use crate::errors::Outcome;
 use crate::options::{Integer, named};
 use jacoflow::filter::ExtendedFilter as Core;
@@ -140,6 +140,8 @@ impl ExtendedKalmanFilter {
     ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, base, zs) = (slf.py(), slf.as_super().get(), items("zs", zs)?);
         let (Rs, mut record) = (for_each_time("Rs", Rs, zs.len())?, Record::default());
+        check_each(&zs, |z| base.measurement_of("zs", z))?;
+        check_each(Rs.iter().flatten(), |R| base.noise("Rs", 3, R))?;
         let copy = |function: &Option<Py<PyAny>>| function.as_ref().map(|function| function.clone_ref(py));
         for (z, R) in zs.iter().zip(&Rs) {
             py.check_signals()?;

@@ -2,7 +2,7 @@
 
 use super::callback::{Callbacks, entry};
 use super::manifold::{FUNCTIONS, Functions, function_or_none};
-use crate::errors::{Outcome, Raised};
+use crate::errors::Outcome;
 use crate::options::{Integer, count};
 use crate::{arrays, keywords::getters};
 use jacoflow::error::Error;
@@ -170,33 +170,34 @@ impl GaussianFilter {
         let (shape, values) = arrays::doubles(NAMES[index], self.get(py, index).bind(py))?;
         let shared = matches!(index, 2 | 3) && shape == self.tail(index);
         if !shared && shape != self.shape(index) {
-            return Err(self.wrong(index, &shape));
+            return Err(Error::shape(NAMES[index], &self.shape(index), &shape).into());
         }
         Ok(values)
-    }
-
-    fn wrong(&self, index: usize, got: &[usize]) -> Raised {
-        Error::shape(NAMES[index], &self.shape(index), got).into()
     }
 
     /// `value` for array `index`: a copy, spread over the batch; a number for a covariance is a multiple of
     /// the identity.
     pub fn covariance(&self, index: usize, value: &Bound<'_, PyAny>) -> Outcome<Py<PyAny>> {
+        self.noise(NAMES[index], index, value)
+    }
+
+    /// As [`Self::covariance`], of an argument called `name`.
+    pub fn noise(&self, name: &'static str, index: usize, value: &Bound<'_, PyAny>) -> Outcome<Py<PyAny>> {
         let py = value.py();
         let numpy = py.import("numpy")?;
-        let (mut shape, mut values) = arrays::doubles(NAMES[index], value)?;
+        let (mut shape, mut values) = arrays::doubles(name, value)?;
         let tail = self.tail(index);
         if let (true, [size, _]) = (shape.is_empty(), tail.as_slice()) {
             let identity = numpy.call_method1("identity", (*size,))?;
             let scaled = numpy.call_method1("multiply", (identity, values[0]))?;
-            (shape, values) = arrays::doubles(NAMES[index], &scaled)?;
+            (shape, values) = arrays::doubles(name, &scaled)?;
         }
         if shape != tail && shape != self.shape(index) {
-            return Err(self.wrong(index, &shape));
+            return Err(Error::shape(name, &self.shape(index), &shape).into());
         }
         match index {
             0 => check_mean(&values)?,
-            1..=3 => check_covariances(NAMES[index], &values, tail[0])?,
+            1..=3 => check_covariances(name, &values, tail[0])?,
             _ => {}
         }
         if matches!(index, 0 | 1) && shape == tail {
@@ -209,20 +210,25 @@ impl GaussianFilter {
     /// Measurements `(m,)` or `(B, m)`; `None` is a missing one, as are masked components; a number is taken
     /// for `m = 1`.
     pub fn measurement(&self, z: &Bound<'_, PyAny>) -> Outcome<Vec<f64>> {
+        self.measurement_of("z", z)
+    }
+
+    /// As [`Self::measurement`], of an argument called `name`.
+    pub fn measurement_of(&self, name: &'static str, z: &Bound<'_, PyAny>) -> Outcome<Vec<f64>> {
         let total = self.batch.unwrap_or(1) * self.dim_z;
         if z.is_none() {
             return Ok(vec![f64::NAN; total]);
         }
         let masked = z.hasattr("mask")?;
-        let (shape, mut values) = arrays::doubles("z", &if masked { z.getattr("data")? } else { z.clone() })?;
+        let (shape, mut values) = arrays::doubles(name, &if masked { z.getattr("data")? } else { z.clone() })?;
         if masked {
             let mask = z.py().import("numpy.ma")?.call_method1("getmaskarray", (z,))?;
-            let mask = arrays::elements::<bool>(&arrays::as_array("z", &mask)?).unwrap_or_default();
+            let mask = arrays::elements::<bool>(&arrays::as_array(name, &mask)?).unwrap_or_default();
             values.iter_mut().zip(mask).filter(|(_, is_missing)| *is_missing).for_each(|(z, _)| *z = f64::NAN);
         }
         let scalar = shape.is_empty() && total == 1;
         if !scalar && shape != self.shape(4) {
-            return Err(Error::shape("z", &self.shape(4), &shape).into());
+            return Err(Error::shape(name, &self.shape(4), &shape).into());
         }
         Ok(values)
     }

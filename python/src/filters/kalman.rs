@@ -2,7 +2,7 @@
 
 use super::callback::{Callbacks, entry, lead, lock, read, write};
 use super::gaussian::{GaussianFilter, sizes};
-use super::sequence::{Record, filtered, for_each_time, items, noises, smoothed};
+use super::sequence::{Record, check_each, filtered, for_each_time, items, noises, smoothed};
 use crate::arrays;
 use crate::errors::Outcome;
 use crate::interrupt::interruptible;
@@ -151,6 +151,12 @@ impl KalmanFilter {
         let (py, base, zs) = (slf.py(), slf.as_super().get(), items("zs", zs)?);
         let all = |name, sequence| for_each_time(name, sequence, zs.len());
         let (Fs, Qs, Hs, Rs) = (all("Fs", Fs)?, all("Qs", Qs)?, all("Hs", Hs)?, all("Rs", Rs)?);
+        let (batch, n, m) = (base.batch, base.dim_x, base.dim_z);
+        check_each(&zs, |z| base.measurement_of("zs", z))?;
+        check_each(Fs.iter().flatten(), |F| Self::matrix("Fs", F, batch, [n, n]))?;
+        check_each(Hs.iter().flatten(), |H| Self::matrix("Hs", H, batch, [m, n]))?;
+        check_each(Qs.iter().flatten(), |Q| base.noise("Qs", 2, Q))?;
+        check_each(Rs.iter().flatten(), |R| base.noise("Rs", 3, R))?;
         let (mut updated, mut predicted) = (Record::default(), Record::default());
         for (k, z) in zs.iter().enumerate() {
             py.check_signals()?;

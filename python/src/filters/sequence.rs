@@ -32,6 +32,14 @@ pub fn for_each_time<'py>(
     Ok(items.into_iter().map(|item| Some(item).filter(|item| !item.is_none())).collect())
 }
 
+/// Checks the items of a sequence before the first step; `check` refuses one by the name of the sequence.
+pub fn check_each<'a, 'py: 'a, T>(
+    items: impl IntoIterator<Item = &'a Bound<'py, PyAny>>,
+    check: impl Fn(&Bound<'py, PyAny>) -> Outcome<T>,
+) -> Outcome<()> {
+    items.into_iter().try_for_each(|item| check(item).map(|_| ()))
+}
+
 /// Means and covariances, one after the other.
 #[derive(Default)]
 pub struct Record {
@@ -84,7 +92,7 @@ pub fn noises(filter: &GaussianFilter, Qs: Option<&Bound<'_, PyAny>>, times: usi
     let Some(Qs) = Qs else { return Ok(None) };
     let py = Qs.py();
     let noises = for_each_time("Qs", Some(Qs), times)?.into_iter().map(|item| match item {
-        Some(Q) => Ok(arrays::doubles("Qs", filter.covariance(2, &Q)?.bind(py))?.1),
+        Some(Q) => Ok(arrays::doubles("Qs", filter.noise("Qs", 2, &Q)?.bind(py))?.1),
         None => filter.read(py, 2),
     });
     noises.collect::<Outcome<_>>().map(Some)

@@ -2,7 +2,7 @@
 
 use super::callback::{Callbacks, entry, lead, lock, read, write};
 use super::gaussian::{GaussianFilter, sizes};
-use super::sequence::{Record, filtered, for_each_time, items, noises, smoothed};
+use super::sequence::{Record, check_each, filtered, for_each_time, items, noises, smoothed};
 use super::sigma_points::MerweScaledSigmaPoints;
 use crate::errors::Outcome;
 use crate::options::{Integer, named};
@@ -239,7 +239,11 @@ impl UnscentedKalmanFilter {
     ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, base, zs) = (slf.py(), slf.as_super().get(), items("zs", zs)?);
         let (Rs, mut record) = (for_each_time("Rs", Rs, zs.len())?, Record::default());
-        for ((z, R), dt) in zs.iter().zip(&Rs).zip(steps(dts, zs.len())?) {
+        let dts = steps(dts, zs.len())?;
+        check_each(&zs, |z| base.measurement_of("zs", z))?;
+        check_each(Rs.iter().flatten(), |R| base.noise("Rs", 3, R))?;
+        check_each(dts.iter().flatten(), |dt| step("dts", dt))?;
+        for ((z, R), dt) in zs.iter().zip(&Rs).zip(&dts) {
             py.check_signals()?;
             Self::predict(slf, dt.as_ref(), None, None)?;
             Self::update(slf, z, R.as_ref(), None, None)?;
