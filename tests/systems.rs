@@ -3,6 +3,9 @@
 // Printed on purpose: figures reached are part of the answer, and a skipped recording is said.
 #![allow(clippy::print_stdout)]
 
+// As the library's own files name it, which the guide's example is one of.
+use jacoflow::jet;
+
 mod affine_flow;
 mod cli;
 mod coarse_to_fine;

@@ -1,7 +1,11 @@
-//! Motion models: by name, and tests that every one of the registry passes.
+//! Motion models: by name, and tests that every one of the registry passes, as does the example in
+//! CONTRIBUTING.md.
 
+mod axial;
+
+use axial::Axial;
 use jacoflow::Error;
-use jacoflow::flow::model::{Axis, ModelKind, ModelVisitor, MotionModel, Per};
+use jacoflow::flow::model::{Axis, ModelKind, ModelVisitor, MotionModel, Parameter, Per};
 use jacoflow::jet::JetRates;
 use jacoflow::math::random::CounterRng;
 use jacoflow::types::Units;
@@ -30,6 +34,12 @@ fn parameters_scale_with_the_pixel_pitch_and_the_period() {
     assert_eq!(scales(ModelKind::Accelerating, Some(0.5)), [4.0, 1.0, 8.0, 2.0]);
 }
 
+#[test]
+fn the_example_of_the_guide_is_the_model_tested_here() {
+    let guide = include_str!("../../CONTRIBUTING.md");
+    assert!(guide.contains(include_str!("model/axial.rs")));
+}
+
 /// One of the tests below, for a model that is chosen at run time.
 struct Conformance(&'static str);
 
@@ -49,8 +59,8 @@ impl ModelVisitor for Conformance {
 fn for_every_model(test: &'static str) {
     for model in ModelKind::ALL {
         model.dispatch(Conformance(test));
-        println!("{} passes {test}", model.name());
     }
+    Conformance(test).run::<Axial, 12, 4>();
 }
 
 #[test]
