@@ -1,12 +1,16 @@
 //! Prediction and update of a batch in square-root form: covariances are sums of squares, which cancellation
 //! cannot make indefinite (G. J. Bierman, "Factorization Methods for Discrete Sequential Estimation", 1977).
+//! The update is one orthogonal transformation of the roots (T. Kailath, A. H. Sayed and B. Hassibi, "Linear
+//! Estimation", 2000, chapter 12), so that neither `S` nor a difference of covariances is ever factorised.
 
 use super::checks::{check_measurement, expect, shared};
 use super::failures::Failures;
 use super::manifold::Manifold;
 use super::state::GaussianState;
 use crate::error::{Error, Result};
-use crate::math::dense::{add_gram, cholesky, forward, multiply, multiply_transposed, solve, symmetrise};
+use crate::math::dense::{
+    PIVOT_ROUNDING, add_gram, backward, covariance_root, forward, lower_triangle, multiply, symmetrise,
+};
 
 /// What is measured, linear in the state: `z - predicted = H (x - mean) + v`, with `P = L L^T`.
 pub(super) struct Measured<'a> {
@@ -21,13 +25,16 @@ pub(super) struct Measured<'a> {
 }
 
 /// Buffers for one state.
+#[derive(Default)]
 struct Scratch {
     seen: Vec<f64>,
     noise: Vec<f64>,
+    noise_root: Vec<f64>,
     S: Vec<f64>,
+    /// Roots of noise and state, and after the transformation those of `S` and of the new `P`.
+    array: Vec<f64>,
     factor: Vec<f64>,
-    K: Vec<f64>,
-    weighted: Vec<f64>,
+    gain: Vec<f64>,
     rest: Vec<f64>,
     white: Vec<f64>,
 }
@@ -38,10 +45,11 @@ impl Scratch {
         for (buffer, length) in [
             (&mut self.seen, m * n),
             (&mut self.noise, m * m),
+            (&mut self.noise_root, m * m),
             (&mut self.S, m * m),
+            (&mut self.array, (m + n) * (m + n)),
             (&mut self.factor, m * m),
-            (&mut self.K, n * m),
-            (&mut self.weighted, n * m),
+            (&mut self.gain, m),
             (&mut self.rest, n * n),
             (&mut self.white, m),
         ] {
@@ -68,10 +76,7 @@ impl GaussianState {
         manifold.residual_z(&known, measured.predicted, &mut y)?;
         failures.add_infinite("residual_z", &mut y)?;
         let (mut P, mut dx) = (vec![0.0; self.P.len()], vec![0.0; self.x.len()]);
-        let none = Vec::new;
-        let (seen, noise, S, factor) = (none(), none(), none(), none());
-        let (K, weighted, rest, white) = (none(), none(), none(), none());
-        let mut scratch = Scratch { seen, noise, S, factor, K, weighted, rest, white };
+        let mut scratch = Scratch::default();
         let is_measured = |item: usize| z[item * m..(item + 1) * m].iter().any(|z| !z.is_nan());
         let mut components = Vec::with_capacity(m);
         for item in 0..self.batch {
@@ -96,7 +101,7 @@ impl GaussianState {
 
     /// The step and the new covariance of one state, by the components listed. False where `S` is singular.
     ///
-    /// With the gain `K`: `P = (L - K H L)(L - K H L)^T + K R K^T`, Joseph's form.
+    /// With `P = L L^T`: the rows `(R^1/2, H L)` and `(0, L)` become `(S^1/2, 0)` and `(K S^1/2, P'^1/2)`.
     fn take_in_one(
         &mut self,
         item: usize,
@@ -108,7 +113,7 @@ impl GaussianState {
     ) -> bool {
         let (n, m, k) = (self.dim_x, self.dim_z, components.len());
         scratch.resize(n, k);
-        let Scratch { seen, noise, S, factor, K, weighted, rest, white } = scratch;
+        let Scratch { seen, noise, noise_root, S, array, factor, gain, rest, white } = scratch;
         let root = &measured.roots[item * n * n..(item + 1) * n * n];
         let all_seen = &measured.seen[item * m * n..(item + 1) * m * n];
         let all_noise = shared(measured.noise, item, m * m);
@@ -122,31 +127,42 @@ impl GaussianState {
         S.copy_from_slice(noise);
         add_gram(seen, n, S);
         symmetrise(S, k);
-        if !cholesky(S, k, factor) {
-            return false;
+        let side = k + n;
+        match covariance_root(noise, k, noise_root) {
+            Some(repaired) => self.repairs += u64::from(repaired),
+            None => return false,
         }
-        multiply_transposed(root, seen, n, K);
-        K.chunks_exact_mut(k).for_each(|row| solve(factor, k, row));
-        for (dx, K) in dx.iter_mut().zip(K.chunks_exact(k)) {
-            *dx = K.iter().zip(&*white).map(|(k, y)| k * y).sum();
+        array.fill(0.0);
+        let (measured, state) = array.split_at_mut(k * side);
+        for (a, row) in measured.chunks_exact_mut(side).enumerate() {
+            row[..k].copy_from_slice(&noise_root[a * k..(a + 1) * k]);
+            row[k..].copy_from_slice(&seen[a * n..(a + 1) * n]);
         }
-        multiply(K, seen, k, rest);
-        rest.iter_mut().zip(root).for_each(|(rest, root)| *rest = root - *rest);
-        multiply(K, noise, k, weighted);
-        multiply_transposed(weighted, K, k, P);
-        symmetrise(P, n);
-        add_gram(rest, n, P);
-        let y = &mut self.y[item * m..(item + 1) * m];
-        for (a, &i) in components.iter().enumerate() {
-            y[i] = white[a];
-            for (b, &j) in components.iter().enumerate() {
-                self.S[item * m * m + i * m + j] = S[a * k + b];
+        state.chunks_exact_mut(side).zip(root.chunks_exact(n)).for_each(|(row, root)| row[k..].copy_from_slice(root));
+        lower_triangle(array, side);
+        let (measured, state) = array.split_at(k * side);
+        for (a, row) in measured.chunks_exact(side).enumerate() {
+            let rounding = PIVOT_ROUNDING * side as f64 * S[a * k + a].sqrt();
+            if row[a].is_nan() || row[a] <= rounding {
+                return false;
             }
-            for row in 0..n {
-                self.K[item * n * m + row * m + i] = K[row * k + a];
-            }
+            factor[a * k..(a + 1) * k].copy_from_slice(&row[..k]);
         }
         forward(factor, k, white);
+        let (all_y, all_S) = (&mut self.y[item * m..(item + 1) * m], &mut self.S[item * m * m..(item + 1) * m * m]);
+        for (a, &i) in components.iter().enumerate() {
+            all_y[i] = y[i];
+            components.iter().enumerate().for_each(|(b, &j)| all_S[i * m + j] = S[a * k + b]);
+        }
+        for (r, row) in state.chunks_exact(side).enumerate() {
+            gain.copy_from_slice(&row[..k]);
+            dx[r] = gain.iter().zip(&*white).map(|(gain, y)| gain * y).sum();
+            backward(factor, k, gain);
+            components.iter().zip(&*gain).for_each(|(&i, gain)| self.K[item * n * m + r * m + i] = *gain);
+            rest[r * n..(r + 1) * n].copy_from_slice(&row[k..]);
+        }
+        P.fill(0.0);
+        add_gram(rest, n, P);
         let squared: f64 = white.iter().map(|v| v * v).sum();
         let determinant: f64 = (0..k).map(|i| factor[i * k + i].ln()).sum::<f64>() * 2.0;
         self.log_likelihood[item] = -0.5 * (squared + determinant + k as f64 * std::f64::consts::TAU.ln());

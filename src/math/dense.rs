@@ -121,7 +121,7 @@ pub fn covariance_fault(a: &[f64], n: usize) -> Option<String> {
 }
 
 /// How small a pivot may be relative to its diagonal entry before it is rounding, per dimension.
-const PIVOT_ROUNDING: f64 = 8.0 * f64::EPSILON;
+pub const PIVOT_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// The lower root of a covariance, `a = l l^T` to rounding, singular ones included: a component without
 /// variance has a column of zeros, and a pivot lost to rounding is raised to the size of rounding. An
@@ -212,9 +212,41 @@ fn negative_eigenvalue(a: &[f64], n: usize) -> Option<f64> {
     Some(values.min()).filter(|least| *least < -ROUNDING * largest)
 }
 
+/// Replaces a square matrix `a` by the lower triangular `l` with `l l^T = a a^T` and a diagonal that is not
+/// negative (A. S. Householder's reflections, from the right).
+///
+/// Each row's error is rounding of that row's length, whatever cancels in `a a^T`.
+pub fn lower_triangle(a: &mut [f64], n: usize) {
+    for j in 0..n {
+        let (row, below) = a[j * n..].split_at_mut(n);
+        let row = &mut row[j..];
+        let norm = row.iter().map(|v| v * v).sum::<f64>().sqrt();
+        if norm == 0.0 {
+            continue;
+        }
+        let scale = 1.0 / (norm * (norm + row[0].abs()));
+        let to = if row[0] > 0.0 { -norm } else { norm };
+        row[0] -= to;
+        for other in below.chunks_exact_mut(n).map(|other| &mut other[j..]) {
+            let part = scale * row.iter().zip(&*other).map(|(v, other)| v * other).sum::<f64>();
+            other.iter_mut().zip(&*row).for_each(|(other, v)| *other -= part * v);
+            if to < 0.0 {
+                other[0] = -other[0];
+            }
+        }
+        row.fill(0.0);
+        row[0] = norm;
+    }
+}
+
 /// Solves `l l^T x = b` in place; a component without a pivot, which has no variance, becomes zero.
 pub fn solve(l: &[f64], n: usize, b: &mut [f64]) {
     forward(l, n, b);
+    backward(l, n, b);
+}
+
+/// Solves `l^T x = b` in place, with zeros as in [`solve`].
+pub fn backward(l: &[f64], n: usize, b: &mut [f64]) {
     for i in (0..n).rev() {
         let dot: f64 = (i + 1..n).map(|k| l[k * n + i] * b[k]).sum();
         b[i] = divide(b[i] - dot, l[i * n + i]);

@@ -1,9 +1,11 @@
 //! What is refused, what is repaired, and which states fail.
 
-#![allow(non_snake_case, reason = "P is the literature's name")]
+#![allow(non_snake_case, reason = "P, H are the literature's name")]
 
 use jacoflow::error::Error;
 use jacoflow::filter::{ExtendedFilter, KalmanFilter, SigmaPoints, UnscentedFilter};
+use jacoflow::math::random::CounterRng;
+use nalgebra::{DMatrix, DVector};
 
 #[test]
 fn a_lost_covariance_is_mended_and_counted() {
@@ -102,10 +104,41 @@ fn least_correlation(P: &[f64], n: usize) -> f64 {
     let of_one = |P: &[f64]| {
         let scale: Vec<f64> = (0..n).map(|k| P[k * (n + 1)].sqrt()).collect();
         assert!(scale.iter().all(|v| *v > 0.0), "{P:?}");
-        let correlation = nalgebra::DMatrix::from_fn(n, n, |i, j| P[i * n + j] / scale[i] / scale[j]);
+        let correlation = DMatrix::from_fn(n, n, |i, j| P[i * n + j] / scale[i] / scale[j]);
         correlation.symmetric_eigenvalues().min()
     };
     P.chunks_exact(n * n).map(of_one).fold(f64::INFINITY, f64::min)
+}
+
+#[test]
+fn precise_sensors_of_one_quantity_agree() {
+    for (p0, r) in [(1e6, 1e-11), (1e12, 1e-12), (1e6, 1e-13)] {
+        let mut filter = KalmanFilter::new(1, 2, 2).unwrap();
+        (filter.P, filter.R) = (vec![p0, 0.0, 0.0, p0], vec![r, 0.0, 0.0, r]);
+        filter.H = vec![1.0, 0.0, 1.0, 0.0];
+        filter.update(&[1.0, 1.0]).unwrap();
+        assert!((filter.x[0] - 1.0).abs() < 1e-9 && filter.x[1] == 0.0, "{:?}", filter.x);
+        let found = [filter.P[0] / (0.5 * r), filter.P[3] / p0].map(|ratio| (ratio - 1.0).abs());
+        assert!(found[0] < 1e-3 && found[1] < 1e-9, "{p0}, {r}: {:?}", filter.P);
+    }
+}
+
+#[test]
+fn many_precise_sensors_leave_the_covariance_of_least_squares() {
+    let rng = CounterRng::new(7);
+    let H = DMatrix::from_fn(6, 3, |i, j| rng.normal((3 * i + j) as u64));
+    for r in [1e-8, 1e-10, 1e-12] {
+        let mut filter = KalmanFilter::new(1, 3, 6).unwrap();
+        filter.H = H.transpose().as_slice().to_vec();
+        (filter.P, filter.R) = ([3, 6].map(|n| DMatrix::<f64>::identity(n, n).as_slice().to_vec())).into();
+        filter.P.iter_mut().for_each(|p| *p *= 1e6);
+        filter.R.iter_mut().for_each(|noise| *noise *= r);
+        filter.update((&H * DVector::from_element(3, 1.0)).as_slice()).unwrap();
+        let expected = (H.transpose() * &H).try_inverse().unwrap() * r;
+        let found = DMatrix::from_row_slice(3, 3, &filter.P);
+        assert!((&found - &expected).amax() < 1e-3 * expected.amax(), "{r}: {found} {expected}");
+        assert!(filter.x.iter().all(|x| (x - 1.0).abs() < 1e-9) && filter.repairs == 0, "{r}: {:?}", filter.x);
+    }
 }
 
 #[test]
