@@ -1,6 +1,6 @@
 """Coarse-to-fine estimate between frames that are not equally bright, beside saturated pixels, over large motions, beside
 a motion boundary (of three frames too) and of undersampled texture: errors, px; share of errors above 1 px that neither
-status nor standard deviation states; change by saturated pixels, standard deviations; bias of pairs in noise, px; share
+status nor standard deviation states; change by saturated pixels, standard deviations; bias of pairs in noise, px; errors in waves and in narrow frames, px; share
 of errors outside 95 % intervals, of undersampled texture and of discs that smoothness holds back, whose own errors are
 relative to their motion; time on equal frames."""
 
@@ -25,6 +25,8 @@ FRACTIONS = ((0.25, 0.3), (1.7, -0.35), (-0.6, 1.4))
 NOISY = (0.5, 1.5, 2.5)
 """Motions of noisy texture, px, and its noise, grey levels."""
 NOISE = 4.0
+NARROW, NARROW_SHIFT = 6, (1.3, -0.6)
+"""Height of frames that are few windows high, and their motion, px."""
 RADIUS, ANGLES = 20.0, (0.02, 0.04)
 """Of discs, px, and their turns, rad."""
 SHIFTS = ((56, 0), (0, -64), (80, 60))
@@ -32,7 +34,7 @@ SHIFTS = ((56, 0), (0, -64), (80, 60))
 
 def rows() -> dict[str, list[float]]:
     """One value for each change and seed, each seed, each shift and seed."""
-    found: dict[str, list[float]] = {"equal": [], "changed": [], "specks": [], "shifts": [], "boundary": [], "three frames": [], "silent": [], "undersampled": [], "noise": [], "outside": [], "discs": [], "disc errors": [], "ms": []}
+    found: dict[str, list[float]] = {"equal": [], "changed": [], "specks": [], "shifts": [], "boundary": [], "three frames": [], "silent": [], "undersampled": [], "noise": [], "waves": [], "narrow": [], "outside": [], "discs": [], "disc errors": [], "ms": []}
     for seed in SEEDS:
         begun = time.process_time()
         found["equal"].append(error(scenes.changed_pair(seed, (3.3, -1.4)), (3.3, -1.4)))
@@ -69,6 +71,12 @@ def rows() -> dict[str, list[float]]:
         pair = (steps.moved(picture, np.eye(2), (k * shift, 0.0)) for k in (0, 1))
         field = jacoflow.flow(*(frame + rng.normal(0, NOISE, frame.shape) for frame in pair), covariance=False, threads=1)
         found["noise"].append(abs(float(np.mean(scenes.inner(field.u))) - shift))
+    for seed in SPECKED:
+        frames, flow = scenes.waves(seed)
+        found["waves"].append(rms(jacoflow.flow(*frames, covariance=False, threads=1).flow - flow))
+        strip = [frame[20 : 20 + NARROW] for frame in scenes.changed_pair(seed, NARROW_SHIFT)]
+        field = jacoflow.flow(*strip, covariance=False, threads=1).flow - np.array(NARROW_SHIFT)
+        found["narrow"].append(float(np.sqrt(np.mean(np.sum(field[:, 8:-8] ** 2, axis=-1)))))
     for shift, seed in itertools.product(SHIFTS, SEEDS):
         field = jacoflow.flow(*scenes.shifted_speckle(seed, shift), covariance=False, threads=1)
         distance = np.linalg.norm(field.flow - np.array(shift), axis=-1)
@@ -93,5 +101,9 @@ def disc(seed: int, angle: float) -> tuple[float, float]:
 
 def error(frames: list[scenes.Array], move: tuple[float, float]) -> float:
     """Root-mean-square error of the flow, px."""
-    flow = jacoflow.flow(*frames, covariance=False, threads=1).flow
-    return float(np.sqrt(np.mean(np.sum(scenes.inner(flow - np.array(move)) ** 2, axis=-1))))
+    return rms(jacoflow.flow(*frames, covariance=False, threads=1).flow - np.array(move))
+
+
+def rms(errors: scenes.Array) -> float:
+    """Root-mean-square length away from the borders."""
+    return float(np.sqrt(np.mean(np.sum(scenes.inner(errors) ** 2, axis=-1))))

@@ -134,3 +134,12 @@ def undersampled(seed: int, shift: tuple[float, float], side: int = 160) -> list
         return np.rint(60 + 6 * sum(terms, np.zeros_like(x)) / np.sqrt(WAVES / 2))
 
     return [frame(0, 0), frame(*shift)]
+
+
+def waves(seed: int, size: int = 160, wavelength: float = 40.0) -> tuple[list[Array], Array]:
+    """Two frames, and the flow between them: waves of 1 px, exact where the first frame is the moved one."""
+    picture = 110 + 40 * texture(seed, (size, size))
+    y, x = np.indices((size, size)).astype(float)
+    flow: Array = np.stack([np.sin(2 * np.pi * y / wavelength), np.cos(2 * np.pi * x / wavelength)], axis=-1)
+    first: Array = map_coordinates(picture, [y + MARGIN + flow[..., 1], x + MARGIN + flow[..., 0]], order=5)
+    return [first, view(picture, (0.0, 0.0), (size, size))], flow

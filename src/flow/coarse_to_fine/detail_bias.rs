@@ -124,7 +124,8 @@ impl DetailBias {
         };
         let mut correction: Vec<[f64; 2]> = differences.iter().zip(&scatter[0]).map(shrunk).collect();
         let side = level.size.0.min(level.size.1) as f64;
-        if side >= MIN_SIDE * WINDOWS[0] && keeps("flow.step") {
+        let is_wide = side >= MIN_SIDE * WINDOWS[0] || !keeps("flow.step_side");
+        if is_wide && keeps("flow.step") {
             let steps = steps(&narrow, &scatter[0], size);
             correction.iter_mut().zip(&steps).for_each(|(flow, step)| (0..2).for_each(|c| flow[c] += step[c]));
         }
@@ -158,7 +159,9 @@ impl DetailBias {
         let [xx, xy, yy] = self.remainder[node];
         let noise = noise_variance(density[0] + density[2]);
         let [near, wide] = NOISE_IN_REMAINDER;
-        let explained = (near / (xx + yy)).min(wide / self.wide_remainder[node][0]);
+        let explained = near / (xx + yy);
+        let explained =
+            if keeps("flow.wide_remainder") { explained.min(wide / self.wide_remainder[node][0]) } else { explained };
         ([xx, xy, yy], (1.0 - noise * explained).max(0.0))
     }
 
@@ -203,7 +206,8 @@ fn site_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, y: usize) -> Vec
     let [above, below] = [y.saturating_sub(1), (y + 1).min(data.height - 1)].map(|y| [4, 5].map(|k| motion.line(k, y)));
     // Over a site's window, curved flow has the mean `u + sigma^2 (u_xx + u_yy) / 2`. Second derivatives are
     // differences of the slopes two sites apart; at a border of one site, half as large.
-    let window = 0.5 * DataOptions::default().sigma.powi(2) / (2.0 * SITE_SPACING);
+    let square = if keeps("flow.window_curvature") { DataOptions::default().sigma.powi(2) } else { 0.0 };
+    let window = 0.5 * square / (2.0 * SITE_SPACING);
     let site = |x: usize| {
         let (before, after) = (x.saturating_sub(1), (x + 1).min(data.width - 1));
         let mut known: [f64; MOTION] = std::array::from_fn(|k| lines[k][x].to_f64());
@@ -256,12 +260,13 @@ fn remainders(sums: &[NodeSums]) -> Vec<[f64; 2]> {
 fn steps(sums: &[NodeSums], scatter: &[Square], size: (usize, usize)) -> Vec<[f64; 2]> {
     let mut steps = remainders(sums);
     let squares = mean_squares(&steps, MAX_STEP, size);
+    let scattered = if keeps("flow.step_scatter") { SCATTER_IN_STEP } else { 0.0 };
     for (n, step) in steps.iter_mut().enumerate() {
         let [a, b, c, _, _, energy] = sums[n];
         let determinant = a * c - b * b;
         let density = if determinant > 0.0 { energy * (a + c) / determinant } else { f64::INFINITY };
         let chance = NOISE_IN_STEP * noise_variance(density)
-            + SCATTER_IN_STEP * (scatter[n][0] + scatter[n][2])
+            + scattered * (scatter[n][0] + scatter[n][2])
             + 2.0 * DOUBTFUL_BIAS.powi(2);
         let share = (1.0 - chance / (squares[n][0] + squares[n][2])).max(0.0);
         *step = step.map(|d| share * d.clamp(-MAX_STEP, MAX_STEP));
