@@ -19,13 +19,14 @@ impl SequenceWriter {
     /// Begins a file, which appears under its name when it is finished. `frame_rate`: frames per second.
     ///
     /// # Errors
-    /// As [`AtomicFile::create`]; [`Error::Argument`] named `frame_rate` unless that is positive.
+    /// As [`AtomicFile::create`]; [`Error::Argument`] named `frame_rate` unless that is positive and a ratio
+    /// of 32-bit numbers.
     pub fn create(path: impl AsRef<Path>, frame_rate: f64) -> Result<Self> {
         if !(frame_rate > 0.0 && frame_rate.is_finite()) {
             return Err(Error::argument("frame_rate", "a positive number of frames per second", frame_rate));
         }
-        let path = path.as_ref();
-        Ok(Self { file: AtomicFile::create(path)?, path: path.to_path_buf(), rate: ratio(frame_rate), size: None })
+        let (path, rate) = (path.as_ref(), ratio(frame_rate)?);
+        Ok(Self { file: AtomicFile::create(path)?, path: path.to_path_buf(), rate, size: None })
     }
 
     /// Adds a picture.

@@ -29,6 +29,32 @@ def test_frames_round_trip(frames, name, dtype, tmp_path):
         assert reader.frame_rate == 50.0
 
 
+@pytest.mark.parametrize(
+    ("rate", "header"),
+    [
+        (24, "F24:1"),
+        (30000 / 1001, "F30000:1001"),
+        (29.97, "F30000:1001"),
+        (12.5, "F25:2"),
+        (1 / 3600, "F1:3600"),
+        (1 / 86400, "F1:86400"),
+        (1e-9, "F1:1000000000"),
+    ],
+)
+def test_frame_rates_of_y4m(frames, rate, header, tmp_path):
+    path = tmp_path / "clip.y4m"
+    io.write_frames(path, frames, frame_rate=rate)
+    assert header in path.read_bytes().split(b"\n")[0].decode().split()
+    assert io.frames(path).frame_rate == pytest.approx(rate, rel=1.001e-6)
+
+
+@pytest.mark.parametrize("rate", [1e300, 1e-10])
+def test_frame_rates_that_y4m_cannot_hold_are_refused(frames, rate, tmp_path):
+    with pytest.raises(ValueError, match="^frame_rate: expected from 1/2147483647 to 2147483647 frames per second, .*, got 1e"):
+        io.write_frames(tmp_path / "clip.y4m", frames, frame_rate=rate)
+    assert not list(tmp_path.iterdir())
+
+
 def test_any_dtype_goes_into_a_stack(frames, tmp_path):
     for dtype in (np.float32, np.float64):
         io.write_frames(tmp_path / "stack.npy", (frame.astype(dtype) for frame in frames))

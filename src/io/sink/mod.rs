@@ -45,8 +45,8 @@ const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, png::KIND];
 /// Opens a sink of grey frames: `-` (Y4M on standard output), `*.y4m`, `*.npy`, or a folder for PNG.
 ///
 /// # Errors
-/// [`Error::Io`] when it cannot be made; [`Error::Argument`] named `frame_rate` unless that is positive, or
-/// `output` for an extension that no sink has.
+/// [`Error::Io`] when it cannot be made; [`Error::Argument`] named `frame_rate` unless that is positive and,
+/// for Y4M, a ratio of 32-bit numbers, or `output` for an extension that no sink has.
 pub fn open_sink(spec: &str, frame_rate: f64) -> Result<Box<dyn FrameSink>> {
     (kind_at_rate(spec, frame_rate)?.open)(spec, frame_rate)
 }

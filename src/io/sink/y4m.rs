@@ -29,16 +29,18 @@ impl Y4mSink {
     /// Begins a file, which appears under its name when it is finished.
     pub fn create(path: impl AsRef<Path>, frame_rate: f64) -> Result<Self> {
         let path = path.as_ref();
-        Ok(Self::new((Output::File(AtomicFile::create(path)?), path.to_path_buf()), frame_rate))
+        let rate = ratio(frame_rate)?;
+        Ok(Self::new((Output::File(AtomicFile::create(path)?), path.to_path_buf()), rate))
     }
 
     /// A file, or standard output for `-`.
     fn open(spec: &str, frame_rate: f64) -> Result<Self> {
-        Ok(Self::new(Output::open(spec.as_ref())?, frame_rate))
+        let rate = ratio(frame_rate)?;
+        Ok(Self::new(Output::open(spec.as_ref())?, rate))
     }
 
-    fn new((output, path): (Output, PathBuf), frame_rate: f64) -> Self {
-        Self { output, path, rate: ratio(frame_rate), uniform: Uniform::default() }
+    fn new((output, path): (Output, PathBuf), rate: (u64, u64)) -> Self {
+        Self { output, path, rate, uniform: Uniform::default() }
     }
 
     fn put(&mut self, frame: &impl FrameFormat, layout: &str, planes: &[u8]) -> Result<()> {
@@ -78,16 +80,46 @@ fn refuse_floats(dtype: &str) -> Error {
     Error::Type { argument: "frame", expected, got: dtype.into() }
 }
 
-/// A frame rate as a ratio: whole, of the family 1000 n / 1001 (29.97, 23.976, ...), or to a millionth.
-pub(in crate::io) fn ratio(rate: f64) -> (u64, u64) {
-    if rate.fract() == 0.0 {
-        return (rate as u64, 1);
+/// Maximum of the numerator and of the denominator of a frame rate: readers take signed integers of 32 bits.
+const MAX_TERM: f64 = i32::MAX as f64;
+
+/// Relative error to which a header holds a frame rate.
+const RATE_TOLERANCE: f64 = 1e-6;
+
+/// A frame rate as a ratio: of the family 1000 n / 1001 where it is the usual short form of one (29.97,
+/// 23.976, ...), else by its continued fraction.
+///
+/// # Errors
+/// [`Error::Argument`] named `frame_rate` for a rate that no ratio of 32-bit numbers holds.
+pub(in crate::io) fn ratio(rate: f64) -> Result<(u64, u64)> {
+    // The short forms are n (1 - 1e-6) 1000 / 1001; the margin is for rounding.
+    let family = (rate * 1.001).round();
+    if family <= 1000.0 && (family * 1000.0 / 1001.0 - rate).abs() <= 1.001 * RATE_TOLERANCE * rate {
+        return Ok((family as u64 * 1000, 1001));
     }
-    let numerator = (rate * 1.001).round() * 1000.0;
-    if (numerator / 1001.0 - rate).abs() < 5e-4 * rate.min(10.0) {
-        return (numerator as u64, 1001);
+    let (numerator, denominator) = continued_fraction(rate);
+    if (numerator / denominator - rate).abs() <= RATE_TOLERANCE * rate {
+        return Ok((numerator as u64, denominator as u64));
     }
-    (((rate * 1e6).round() as u64).max(1), 1_000_000)
+    let expected = format!("from 1/{MAX_TERM} to {MAX_TERM} frames per second, which a Y4M header can hold");
+    Err(Error::argument("frame_rate", expected, format!("{rate:e}")))
+}
+
+/// The first convergent of the continued fraction of `value` that equals it to rounding, or the last one
+/// whose terms are at most [`MAX_TERM`].
+fn continued_fraction(value: f64) -> (f64, f64) {
+    let (mut last, mut here, mut rest) = ((0.0, 1.0), (1.0, 0.0), value);
+    loop {
+        let whole = rest.floor();
+        let next = (whole * here.0 + last.0, whole * here.1 + last.1);
+        if !(next.0 <= MAX_TERM && next.1 <= MAX_TERM) {
+            return here;
+        }
+        (last, here, rest) = (here, next, (rest - whole).recip());
+        if (here.0 / here.1 - value).abs() <= 1e-14 * value {
+            return here;
+        }
+    }
 }
 
 impl FrameSink for Y4mSink {
@@ -122,7 +154,30 @@ mod tests {
 
     #[test]
     fn frame_rates_become_ratios() {
-        assert_eq!([25.0, 29.97, 23.976, 59.94].map(ratio), [(25, 1), (30000, 1001), (24000, 1001), (60000, 1001)]);
-        assert_eq!([12.5, 0.1].map(ratio), [(12_500_000, 1_000_000), (100_000, 1_000_000)]);
+        let known = |rate: f64| ratio(rate).unwrap();
+        assert_eq!([25.0, 29.97, 23.976, 59.94].map(known), [(25, 1), (30000, 1001), (24000, 1001), (60000, 1001)]);
+        assert_eq!([12.5, 0.1, 23.98, 29.971].map(known), [(25, 2), (1, 10), (1199, 50), (29971, 1000)]);
+        assert_eq!([30000.0 / 1001.0, 10000.0 / 1001.0].map(known), [(30000, 1001), (10000, 1001)]);
+        assert_eq!(
+            [1.0 / 3600.0, 1.0 / 86400.0, 1e-9, MAX_TERM].map(known),
+            [(1, 3600), (1, 86400), (1, 1_000_000_000), (i32::MAX as u64, 1)]
+        );
+    }
+
+    #[test]
+    fn frame_rates_in_range_are_held_to_a_billionth() {
+        for step in 0..2000 {
+            let rate = (f64::from(step) * 0.02135 - 21.35).exp();
+            let (a, b) = ratio(rate).unwrap();
+            assert!((a as f64 / b as f64 / rate - 1.0).abs() < 1e-9, "{rate}: {a}/{b}");
+        }
+    }
+
+    #[test]
+    fn frame_rates_that_no_header_holds_are_refused() {
+        for rate in [1e300, 4e9, 1e-10, 5e-324] {
+            let message = ratio(rate).unwrap_err().to_string();
+            assert!(message.starts_with("frame_rate: expected from 1/2147483647 to 2147483647 "), "{message}");
+        }
     }
 }
