@@ -147,7 +147,10 @@ class Video:
                 if self._stop is not None and index + 1 >= self._stop:
                     return
         except self._av.FFmpegError as error:
-            raise FormatError(f"{self._path}: decoding stopped ({error})") from error
+            raise FormatError(
+                f"{self._path}: decoding stopped ({error}); if another program shows the video, save its frames there as a "
+                "folder of PNG files"
+            ) from error
 
     def _decoded(self, stream: Any) -> Iterator[Any]:
         """The frames; `FormatError` where the file is cut off amid one, which decoders fill up."""

@@ -76,6 +76,9 @@ fn failures_carry_the_program_s_words() {
     let (_folder, source) = open("echo 'moov atom not found' >&2; exit 1");
     let message = source.unwrap_err().to_string();
     assert!(message.contains("moov atom not found") && message.contains("video.mp4"), "{message}");
+    let (_folder, source) = open("echo '[webp @ 0x5591] no image data' >&2; echo 'Conversion failed!' >&2; exit 1");
+    let message = source.unwrap_err().to_string();
+    assert!(message.contains("ffmpeg cannot decode it: no image data. If another program shows it, "), "{message}");
     let (_folder, source) = open(r"printf 'YUV4MPEG2 W2 H1 Cmono\nFRAME\nab'; echo 'late trouble' >&2; exit 3");
     let mut source = source.unwrap();
     source.next_frame().unwrap();

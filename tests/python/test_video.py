@@ -1,6 +1,7 @@
 """Compressed video: right frames, right brightness, files closed, clear refusals."""
 
 import pickle
+import struct
 import sys
 from fractions import Fraction
 
@@ -169,6 +170,17 @@ def test_a_video_that_is_cut_off_says_so(reader, codec, name, monkeypatch, tmp_p
         monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(jacoflow.FormatError, match=rf"{name}: cut off"):
         list(video.frames(path) if reader == "video" else io.frames(path, colour="luminance"))
+
+
+def test_a_video_that_is_not_decoded_names_a_remedy(tmp_path):
+    # An animated WebP, whose frames the decoder does not read.
+    side, frame = (7).to_bytes(3, "little"), bytes(16)
+    chunks = b"VP8X" + struct.pack("<I", 10) + b"\2\0\0\0" + side + side + b"ANIM" + struct.pack("<I", 6) + bytes(6)
+    chunks += b"ANMF" + struct.pack("<I", len(frame)) + frame
+    path = tmp_path / "a.webp"
+    path.write_bytes(b"RIFF" + struct.pack("<I", 4 + len(chunks)) + b"WEBP" + chunks)
+    with pytest.raises(jacoflow.FormatError, match="a.webp: decoding stopped .*; if another program shows the video, save .* PNG"):
+        next(io.frames(path, colour="luminance"))
 
 
 def test_times_of_a_variable_frame_rate(tmp_path):

@@ -126,13 +126,23 @@ impl<P: ChannelPolicy> FfmpegSource<P> {
                 }
                 Err(error) => failure = Some(running.explain(path, error)),
             }
-            let is_older = |words: &str| words.contains("fps_mode") || words.contains("direct");
-            if !failure.as_ref().is_some_and(|error| is_older(&error.to_string())) {
+            let words = running.last_words();
+            if !(words.contains("fps_mode") || words.contains("direct")) {
                 break;
             }
         }
         Err(failure.unwrap_or_else(|| Error::format(path, "ffmpeg gave no output")))
     }
+}
+
+/// What to do with a video that ffmpeg does not decode.
+const CONVERT: &str = "If another program shows it, save its frames there as a folder of PNG files";
+
+/// The first line of what the program said, which names the cause; those after it say what failed in turn.
+fn first_line(words: &str) -> &str {
+    let line = words.lines().next().unwrap_or_default().trim_end_matches('.');
+    // "[webp @ 0x55912c35f240] image data not found"
+    line.split_once(" @ 0x").and_then(|(_, rest)| rest.split_once("] ")).map_or(line, |(_, cause)| cause)
 }
 
 impl Running {
@@ -181,7 +191,7 @@ impl Running {
         let _ = self.child.wait();
         match self.last_words() {
             words if words.is_empty() => error,
-            words => Error::format(path, format!("ffmpeg cannot decode it: {words}")),
+            words => Error::format(path, format!("ffmpeg cannot decode it: {}. {CONVERT}", first_line(&words))),
         }
     }
 
@@ -190,7 +200,10 @@ impl Running {
         let status = self.child.wait().map_err(|e| Error::io(path, e))?;
         let words = self.last_words();
         if !status.success() {
-            return Err(Error::format(path, format!("ffmpeg stopped with {status}: {words}")));
+            return Err(Error::format(
+                path,
+                format!("ffmpeg stopped with {status}: {}. {CONVERT}", first_line(&words)),
+            ));
         }
         if words.contains("File ended prematurely") {
             return Err(Error::format(path, format!("cut off: {words}")));
