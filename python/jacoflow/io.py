@@ -81,9 +81,10 @@ def frames(
     unless its header says XCOLORRANGE=FULL.
 
     Levels are the file's where its white is 255 or 65535, or unknown (floats, arrays); others are brought to
-    the white of uint8 or uint16 (PNM of another maximum, PNG and TIFF of under 8 bits, Y4M of 9 to 15). Video
-    is luma as coded, most often 16 to 235, that of RGB (GIF) too; where it is cut off amid a frame it ends
-    with `FormatError`. JPEG and PNG are turned as their EXIF data say for the display, TIFF is not.
+    the white of uint8 or uint16 (PNM of another maximum, PNG and TIFF of under 8 bits, Y4M of 9 to 15). TIFF
+    of 12 bits keeps its levels, 0 to 4095 in uint16. Video is luma as coded, most often 16 to 235, that of RGB
+    (GIF) too; where it is cut off amid a frame it ends with `FormatError`. JPEG and PNG are turned as their
+    EXIF data say for the display, TIFF is not.
 
     >>> import tempfile, numpy as np
     >>> from jacoflow import io
