@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import operator
+import os
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -69,6 +70,14 @@ def converted(name: str, value: Any, convert: Callable[[Any], Any], expected: st
         return convert(value)
     except (TypeError, OverflowError):
         raise TypeError(f"{name}: expected {expected}, got {shown(value)}") from None
+
+
+def path_of(name: str, value: str | os.PathLike[str]) -> str:
+    """A path as a string; TypeError by name for another object."""
+    path = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(path, str):
+        raise TypeError(f"{name}: expected a path (a string or os.PathLike), got {type(value).__name__}")
+    return path
 
 
 def shown(value: Any) -> str:

@@ -551,9 +551,9 @@ def estimate(
 
 def flow(
     first: _Frame,
-    second: _Frame,
+    second: _Frame | None = None,
     third: _Frame | None = None,
-    *,
+    *more: Any,
     method: FlowMethod | None = None,
     initial: FlowField | ArrayLike | None = None,
     temporal: Fusion | None = None,

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._brief import Brief, Rows
-from ._checks import known_options
+from ._checks import known_options, path_of
 from ._jacoflow import _write_particle_tracks
 from ._particle_options import checked_box, checked_boxes, checked_id
 from ._particle_track import Array, ParticleStep, ParticleTracker
@@ -134,7 +134,7 @@ class ParticleTracks(Brief):
         self._write(path, "csv")
 
     def _write(self, path: str | os.PathLike[str], form: str) -> None:
-        _write_particle_tracks(os.fspath(path), form, [step._compiled for step in self.steps])
+        _write_particle_tracks(path_of("path", path), form, [step._compiled for step in self.steps])
 
 
 def track_particles(

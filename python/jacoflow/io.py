@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._checks import path_of
 from ._jacoflow import (
     FlowField,
     _read_disparity,
@@ -94,7 +95,7 @@ def frames(
     4
     [(8, 10), (8, 10)]
     """
-    return FrameReader(Request(os.fspath(source), colour, grey, channel, z, key, start, stop, step))
+    return FrameReader(Request(path_of("source", source), colour, grey, channel, z, key, start, stop, step))
 
 
 def write_frames(path: _Path, frames: Iterable[NDArray[Any]], *, frame_rate: float = 25.0) -> int:

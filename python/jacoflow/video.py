@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _coded
+from ._checks import path_of
 from ._jacoflow import FormatError, MissingDependencyError
 
 __all__ = ["Video", "frames"]
@@ -92,7 +93,7 @@ class Video:
         if grey not in ("luma", "bt601", None):
             raise ValueError(f"grey: expected 'luma', 'bt601' or None, got {grey!r}")
         self._av = _pyav()
-        self._path = os.fspath(path)
+        self._path = path_of("path", path)
         self._start, self._stop, self._step, self._grey = start, stop, step, grey
         self._container: Any = self._open()
 

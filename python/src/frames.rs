@@ -205,14 +205,14 @@ fn request(
 #[pyo3(signature = (spec, colour, grey, channel, z, start, stop, step))]
 #[expect(clippy::too_many_arguments, reason = "the options of jacoflow.io.frames")]
 pub fn source_kind(
-    spec: PathBuf,
-    colour: Option<&str>,
-    grey: Option<&str>,
-    channel: Option<Integer>,
+    #[pyo3(from_py_with = named::spec)] spec: PathBuf,
+    #[pyo3(from_py_with = named::colour)] colour: Option<&str>,
+    #[pyo3(from_py_with = named::grey)] grey: Option<&str>,
+    #[pyo3(from_py_with = named::channel)] channel: Option<Integer>,
     z: Option<&Bound<'_, PyAny>>,
-    start: Integer,
-    stop: Option<Integer>,
-    step: Integer,
+    #[pyo3(from_py_with = named::start)] start: Integer,
+    #[pyo3(from_py_with = named::stop)] stop: Option<Integer>,
+    #[pyo3(from_py_with = named::step)] step: Integer,
 ) -> Outcome<Option<&'static str>> {
     request(colour, grey, channel, z, start, stop, step)?;
     Ok(kind_of(&spec.to_string_lossy()))
@@ -224,14 +224,14 @@ pub fn source_kind(
 #[expect(clippy::too_many_arguments, reason = "the options of jacoflow.io.frames")]
 pub fn open_frames(
     py: Python<'_>,
-    spec: PathBuf,
-    colour: Option<&str>,
-    grey: Option<&str>,
-    channel: Option<Integer>,
+    #[pyo3(from_py_with = named::spec)] spec: PathBuf,
+    #[pyo3(from_py_with = named::colour)] colour: Option<&str>,
+    #[pyo3(from_py_with = named::grey)] grey: Option<&str>,
+    #[pyo3(from_py_with = named::channel)] channel: Option<Integer>,
     z: Option<&Bound<'_, PyAny>>,
-    start: Integer,
-    stop: Option<Integer>,
-    step: Integer,
+    #[pyo3(from_py_with = named::start)] start: Integer,
+    #[pyo3(from_py_with = named::stop)] stop: Option<Integer>,
+    #[pyo3(from_py_with = named::step)] step: Integer,
 ) -> Outcome<PyFrameSource> {
     let (reading, options) = request(colour, grey, channel, z, start, stop, step)?;
     let spec = spec.to_string_lossy().into_owned();
@@ -243,7 +243,7 @@ pub fn open_frames(
 #[pyfunction(name = "_write_frames")]
 pub fn write_frames(
     py: Python<'_>,
-    path: PathBuf,
+    #[pyo3(from_py_with = named::path)] path: PathBuf,
     frames: &Bound<'_, PyAny>,
     #[pyo3(from_py_with = named::frame_rate)] frame_rate: f64,
 ) -> Outcome<usize> {
@@ -284,10 +284,10 @@ fn write_all<'py, F: Send + Sync>(
 #[pyo3(signature = (path, colour, grey, channel, z))]
 pub fn read_one_image<'py>(
     py: Python<'py>,
-    path: PathBuf,
-    colour: Option<&str>,
-    grey: Option<&str>,
-    channel: Option<Integer>,
+    #[pyo3(from_py_with = named::path)] path: PathBuf,
+    #[pyo3(from_py_with = named::colour)] colour: Option<&str>,
+    #[pyo3(from_py_with = named::grey)] grey: Option<&str>,
+    #[pyo3(from_py_with = named::channel)] channel: Option<Integer>,
     z: Option<&Bound<'py, PyAny>>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let reading = Reading::parse(colour, grey)?;

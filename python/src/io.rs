@@ -3,6 +3,7 @@
 use super::{arrays, field::FlowField, field::Store};
 use crate::errors::Outcome;
 use crate::interrupt::abandonable;
+use crate::options::named;
 use jacoflow::error::{Error, shape_text};
 use jacoflow::io::{
     FieldFormat, FloatMap, FlowImage, NumberedFiles, npz::NpzReader, read_flo, read_kitti, read_npz_from, read_pfm,
@@ -39,7 +40,11 @@ fn from_flow_image<'py>(py: Python<'py>, flow: &FlowImage) -> Outcome<Bound<'py,
 
 /// Reads flow in one of the exchange formats.
 #[pyfunction(name = "_read_flow")]
-pub fn read_flow<'py>(py: Python<'py>, path: PathBuf, format: &str) -> Outcome<Bound<'py, PyAny>> {
+pub fn read_flow<'py>(
+    py: Python<'py>,
+    #[pyo3(from_py_with = named::path)] path: PathBuf,
+    format: &str,
+) -> Outcome<Bound<'py, PyAny>> {
     let is_kitti = format == "kitti";
     let flow = abandonable(py, move || if is_kitti { read_kitti(&path) } else { read_flo(&path) })?;
     from_flow_image(py, &flow)
@@ -47,7 +52,12 @@ pub fn read_flow<'py>(py: Python<'py>, path: PathBuf, format: &str) -> Outcome<B
 
 /// Writes flow in one of the exchange formats.
 #[pyfunction(name = "_write_flow")]
-pub fn write_flow(py: Python<'_>, path: PathBuf, flow: &Bound<'_, PyAny>, format: &str) -> Outcome<()> {
+pub fn write_flow(
+    py: Python<'_>,
+    #[pyo3(from_py_with = named::path)] path: PathBuf,
+    flow: &Bound<'_, PyAny>,
+    format: &str,
+) -> Outcome<()> {
     let flow = flow_image("flow", flow)?;
     Ok(py.detach(|| match format {
         "kitti" => write_kitti(&path, &flow),
@@ -57,7 +67,7 @@ pub fn write_flow(py: Python<'_>, path: PathBuf, flow: &Bound<'_, PyAny>, format
 
 /// Reads a float map.
 #[pyfunction(name = "_read_pfm")]
-pub fn read_float_map(py: Python<'_>, path: PathBuf) -> Outcome<Bound<'_, PyAny>> {
+pub fn read_float_map(py: Python<'_>, #[pyo3(from_py_with = named::path)] path: PathBuf) -> Outcome<Bound<'_, PyAny>> {
     let map = abandonable(py, move || read_pfm(&path))?;
     let mut planes = map.planes;
     if planes.len() == 1 {
@@ -69,7 +79,11 @@ pub fn read_float_map(py: Python<'_>, path: PathBuf) -> Outcome<Bound<'_, PyAny>
 
 /// Writes a float map.
 #[pyfunction(name = "_write_pfm")]
-pub fn write_float_map(py: Python<'_>, path: PathBuf, values: &Bound<'_, PyAny>) -> Outcome<()> {
+pub fn write_float_map(
+    py: Python<'_>,
+    #[pyo3(from_py_with = named::path)] path: PathBuf,
+    values: &Bound<'_, PyAny>,
+) -> Outcome<()> {
     let (shape, values) = arrays::doubles("values", values)?;
     let (height, width, count) = match shape[..] {
         [height, width] => (height, width, 1),

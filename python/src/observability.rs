@@ -3,7 +3,7 @@
 use super::arrays;
 use super::frame_list::Frames;
 use super::image::renamed;
-use super::options::{self, Object, PreprocessOptions};
+use super::options::{self, Object, PreprocessOptions, named};
 use crate::errors::Outcome;
 use crate::interrupt::interruptible;
 use jacoflow::error::Error;
@@ -22,11 +22,11 @@ use pyo3::types::PyDict;
 #[pyo3(signature = (frames, *, time_scheme=None, neighbourhood=None, neighbourhood_sigma=None, preprocess=None, threads=None))]
 pub fn observability<'py>(
     frames: &Bound<'py, PyAny>,
-    time_scheme: Option<&str>,
+    #[pyo3(from_py_with = named::time_scheme)] time_scheme: Option<&str>,
     neighbourhood: Option<&Bound<'py, PyAny>>,
-    neighbourhood_sigma: Option<f64>,
+    #[pyo3(from_py_with = named::neighbourhood_sigma)] neighbourhood_sigma: Option<f64>,
     preprocess: Object,
-    threads: Option<options::Integer>,
+    #[pyo3(from_py_with = named::threads)] threads: Option<options::Integer>,
 ) -> Outcome<Bound<'py, PyDict>> {
     let py = frames.py();
     let preprocess = PreprocessOptions::new(py, &preprocess)?;

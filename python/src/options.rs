@@ -11,6 +11,7 @@ use jacoflow::types::{Mask, Precision, Rect, Sample, SamplingGrid, Units};
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use std::path::PathBuf;
 
 /// An integer argument. One that 64 bits do not hold becomes the nearest that they do, so that it is refused
 /// by name where it is out of range.
@@ -53,7 +54,9 @@ arguments!(
     (f64, f64): "numbers up to 1.8e308",
     Integer: "an integer",
     bool: "True or False",
+    &str: "a string",
     String: "a string",
+    PathBuf: "a path (a string or os.PathLike)",
     Region: "four integers (x, y, width, height)",
     Py<PyAny>: "an object",
 );
@@ -68,7 +71,7 @@ impl<T: Argument> Argument for Option<T> {
 
 /// The argument called `name`: one of another type, or a number that its type does not hold, is refused by
 /// name.
-fn argument<'py, T: Argument + FromPyObjectOwned<'py>>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<T> {
+fn argument<'a, 'py, T: Argument + FromPyObject<'a, 'py>>(name: &str, value: &'a Bound<'py, PyAny>) -> PyResult<T> {
     value.extract::<T>().map_err(|error| {
         let error: PyErr = error.into();
         if error.is_instance_of::<PyOverflowError>(value.py()) {
@@ -88,16 +91,16 @@ const MAX_DIGITS: usize = 40;
 
 /// Arguments by their names, for `from_py_with`.
 pub mod named {
-    use super::{Argument, Bound, FromPyObjectOwned, PyAny, PyResult, argument};
+    use super::{Argument, Bound, FromPyObject, PyAny, PyResult, argument};
 
     macro_rules! arguments {
         ($($name:ident)*) => {$(
-            pub fn $name<'py, T: Argument + FromPyObjectOwned<'py>>(value: &Bound<'py, PyAny>) -> PyResult<T> {
+            pub fn $name<'a, 'py, T: Argument + FromPyObject<'a, 'py>>(value: &'a Bound<'py, PyAny>) -> PyResult<T> {
                 argument(stringify!($name), value)
             }
         )*};
     }
-    arguments!(augmented backward batch between blur_sigma classes colour_cast covariance diagnostics dim_x dim_z duration forward_backward fps frame_rate grid index initial left_right_check length_unit levels mask max_count max_steps method min_distance min_eigenvalue min_step n n_components n_near n_particles name noise origin pairs pixel_pitch precision preprocess prior_radius profile quality random_state redraw saturate scale search simd start step subpixel t temporal threads threshold truncate update_first window x y);
+    arguments!(aggregate alpha augmented backward batch beta between blur_sigma carrier channel classes colour colour_cast count covariance diagnostics dim_x dim_z duration ends forward_backward fps frame_rate frames grey grid height index initial interval kappa left_right_check length_unit levels mask max_count max_steps method min_distance min_eigenvalue min_step n n_components n_near n_particles name neighbourhood_sigma noise options origin pairs path pixel_pitch points precision preprocess prior_radius profile quality random_state redraw rounding saturate scale scheme search sigma simd spec start step stop subpixel t temporal threads threshold time time_scheme truncate update_first width window x y);
 }
 
 /// The argument `region`, any sequence (x, y, width, height), px.

@@ -4,6 +4,7 @@ use crate::arrays;
 use crate::errors::Outcome;
 use jacoflow::error::{Error, shape_text};
 use jacoflow::types::{Rect, Region};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
 /// What a region may be, for messages.
@@ -24,6 +25,12 @@ pub fn parse(object: Option<&Bound<'_, PyAny>>) -> Outcome<Option<Region>> {
         (_, &[x, y, width, height]) if shape == [4] => rectangle([x, y, width, height]).map(Some),
         (_, &[x, y, radius]) if shape == [3] => Ok(Some(Region::Disc { centre: (x, y), radius })),
         ([_, 2], _) => Ok(Some(Region::Polygon(values.as_chunks::<2>().0.iter().map(|&[x, y]| (x, y)).collect()))),
+        ([_, _], _) => {
+            let dtype = arrays::dtype_name(&arrays::as_array("region", object)?);
+            let got = format!("{dtype} of shape {}", shape_text(&shape));
+            Err(PyTypeError::new_err(format!("region: expected a boolean mask (H, W) or corners (N, 2), got {got}"))
+                .into())
+        }
         _ => Err(Error::argument("region", EXPECTED, format!("shape {}", shape_text(&shape))).into()),
     }
 }

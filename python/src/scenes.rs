@@ -54,12 +54,12 @@ impl Scene {
     #[new]
     #[pyo3(signature = (name, *, width=None, height=None, origin=None, random_state=None, carrier=None, **parameters))]
     fn new(
-        name: String,
-        width: Option<Integer>,
-        height: Option<Integer>,
+        #[pyo3(from_py_with = named::name)] name: String,
+        #[pyo3(from_py_with = named::width)] width: Option<Integer>,
+        #[pyo3(from_py_with = named::height)] height: Option<Integer>,
         #[pyo3(from_py_with = named::origin)] origin: Option<(f64, f64)>,
         #[pyo3(from_py_with = named::random_state)] random_state: Option<u64>,
-        carrier: Option<String>,
+        #[pyo3(from_py_with = named::carrier)] carrier: Option<String>,
         parameters: Option<&Bound<'_, PyDict>>,
     ) -> Outcome<Self> {
         let default = SceneOptions::default();
@@ -105,7 +105,7 @@ impl Scene {
     fn frames<'py>(
         &self,
         py: Python<'py>,
-        count: Integer,
+        #[pyo3(from_py_with = named::count)] count: Integer,
         #[pyo3(from_py_with = named::start)] start: f64,
     ) -> Outcome<Bound<'py, PyAny>> {
         let wrong = |_| Error::argument("count", "zero or a positive integer", count.0);
@@ -218,7 +218,7 @@ impl Sensor {
     #[pyo3(signature = (*, noise=None, rounding=None, saturate=None, random_state=None))]
     fn new(
         #[pyo3(from_py_with = named::noise)] noise: Option<f64>,
-        rounding: Option<&str>,
+        #[pyo3(from_py_with = named::rounding)] rounding: Option<&str>,
         #[pyo3(from_py_with = named::saturate)] saturate: Option<bool>,
         #[pyo3(from_py_with = named::random_state)] random_state: Option<u64>,
     ) -> Outcome<Self> {
@@ -332,7 +332,10 @@ pub fn scene_carriers(py: Python<'_>) -> Outcome<Bound<'_, PyDict>> {
 ///
 /// ValueError for an unknown name.
 #[pyfunction(name = "_scene_parameters")]
-pub fn scene_parameters<'py>(py: Python<'py>, name: &str) -> Outcome<Bound<'py, PyDict>> {
+pub fn scene_parameters<'py>(
+    py: Python<'py>,
+    #[pyo3(from_py_with = named::name)] name: &str,
+) -> Outcome<Bound<'py, PyDict>> {
     let scenes = SCENES.iter().map(|kind| (kind.name, kind.parameters));
     let known: Vec<(&str, &[Parameter])> =
         scenes.chain(CARRIERS.iter().map(|kind| (kind.name, kind.parameters))).collect();

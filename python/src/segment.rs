@@ -46,8 +46,8 @@ interleaved!(u8 => f32, u16 => f32, f32 => f32, f64 => f64);
 #[pyfunction(name = "_felzenszwalb")]
 pub fn segment_felzenszwalb<'py>(
     image: &Bound<'py, PyAny>,
-    scale: f64,
-    sigma: f64,
+    #[pyo3(from_py_with = named::scale)] scale: f64,
+    #[pyo3(from_py_with = named::sigma)] sigma: f64,
     min_size: i64,
     #[pyo3(from_py_with = named::threads)] threads: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {

@@ -164,14 +164,17 @@ fn format_of(path: &Path) -> Result<DisparityFormat> {
 
 /// The compiled part of `jacoflow.io.read_disparity`: disparity (H, W), px.
 #[pyfunction(name = "_read_disparity")]
-pub fn read_disparity(py: Python<'_>, path: PathBuf) -> Outcome<Bound<'_, PyAny>> {
+pub fn read_disparity(py: Python<'_>, #[pyo3(from_py_with = named::path)] path: PathBuf) -> Outcome<Bound<'_, PyAny>> {
     let format = format_of(&path)?;
     arrays::from_frame(py, abandonable(py, move || format.read(&path))?.disparity)
 }
 
 /// The compiled part of `jacoflow.io.write_disparity`: how many disparities the format could not hold.
 #[pyfunction(name = "_write_disparity")]
-pub fn write_disparity(path: PathBuf, disparity: &Bound<'_, PyAny>) -> Outcome<usize> {
+pub fn write_disparity(
+    #[pyo3(from_py_with = named::path)] path: PathBuf,
+    disparity: &Bound<'_, PyAny>,
+) -> Outcome<usize> {
     let format = format_of(&path)?;
     let map = DisparityMap::plain(arrays::frame("disparity", disparity, ColourRule::Refuse)?.to_real());
     Ok(disparity.py().detach(|| format.write(&path, &map))?)

@@ -72,11 +72,11 @@ impl TargetScene {
     #[pyo3(signature = (name, *, random_state=0, scale=0.5, noise=2.5, frames=None, colour_cast=0.0))]
     fn new(
         py: Python<'_>,
-        name: &str,
+        #[pyo3(from_py_with = named::name)] name: &str,
         #[pyo3(from_py_with = named::random_state)] random_state: u64,
         #[pyo3(from_py_with = named::scale)] scale: f64,
         #[pyo3(from_py_with = named::noise)] noise: f64,
-        frames: Option<Integer>,
+        #[pyo3(from_py_with = named::frames)] frames: Option<Integer>,
         #[pyo3(from_py_with = named::colour_cast)] colour_cast: f64,
     ) -> Outcome<Self> {
         let count = |Integer(count): Integer| {
@@ -102,7 +102,7 @@ impl TargetScene {
     fn frame<'py>(
         &self,
         py: Python<'py>,
-        t: Integer,
+        #[pyo3(from_py_with = named::t)] t: Integer,
         targets: Option<Bound<'py, PyAny>>,
     ) -> Outcome<Bound<'py, PyAny>> {
         let (t, drawn, threads) = (self.index(t)?, self.drawn(targets)?, Threads::new(None)?);

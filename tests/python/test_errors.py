@@ -9,7 +9,7 @@ import pytest
 
 from grouped_options import grouped
 import jacoflow
-from jacoflow import FlowEstimator, FlowFilter, JacoflowError, scenes
+from jacoflow import FlowEstimator, FlowField, FlowFilter, JacoflowError, filters, io, scenes, video
 
 GOOD = np.zeros((3, 8, 10), np.uint8)
 
@@ -424,3 +424,77 @@ def test_colour_frames_are_refused_with_the_option_that_takes_them():
         jacoflow.estimate(np.zeros((4, 24, 32, 3), np.uint8))
     with pytest.raises(ValueError, match=r'^first: expected a grey frame .*pass preprocess=Preprocess\(colour="luminance"\)'):
         jacoflow.flow(*np.zeros((2, 24, 32, 3), np.uint8))
+
+
+SCENE = scenes.Scene("affine", width=32, height=24)
+FIELD = jacoflow.flow(*SCENE.frames(2))
+WORD, NUMBER, INTEGER, PATH = "a string", "a number", "an integer", r"a path \(a string or os.PathLike\)"
+
+
+@pytest.mark.parametrize(
+    ("argument", "expected", "call"),
+    [
+        ("ends", WORD, lambda: jacoflow.estimate(GOOD, ends=3)),
+        ("time", NUMBER, lambda: FlowEstimator().push(GOOD[0], time="now")),
+        ("aggregate", WORD, lambda: FIELD.region_mean("u", aggregate=3)),
+        ("interval", WORD, lambda: FlowField.from_arrays(FIELD.flow, interval=3)),
+        ("options", WORD, lambda: FIELD.save("a.npz", options=3)),
+        ("scheme", WORD, lambda: filters.resample([0.5, 0.5], scheme=3)),
+        ("scheme", WORD, lambda: filters.ParticleFilter(1, 10).resample(3)),
+        ("random_state", INTEGER, lambda: filters.ParticleFilter(1, 10, random_state="x")),
+        ("dim_x", INTEGER, lambda: filters.KalmanFilter("2", 1)),
+        ("ids", "integers", lambda: filters.ParticleFilter(1, 10, ids=["x"])),
+        ("ids", "1 integers", lambda: filters.ParticleFilter(1, 10, ids=3)),
+        ("points", "MerweScaledSigmaPoints", lambda: filters.UnscentedKalmanFilter(1, 1, 1.0, abs, abs, "x")),
+        ("scale", NUMBER, lambda: jacoflow.segment.felzenszwalb(GOOD[0], scale="x")),
+        ("sigma", NUMBER, lambda: jacoflow.segment.felzenszwalb(GOOD[0], sigma="x")),
+        ("n", INTEGER, lambda: filters.MerweScaledSigmaPoints("2")),
+        ("alpha", NUMBER, lambda: filters.MerweScaledSigmaPoints(2, alpha="x")),
+        ("name", WORD, lambda: scenes.Scene(3)),
+        ("width", INTEGER, lambda: scenes.Scene("affine", width="a")),
+        ("carrier", WORD, lambda: scenes.Scene("affine", carrier=3)),
+        ("count", INTEGER, lambda: SCENE.frames("3")),
+        ("name", WORD, lambda: scenes.parameters(3)),
+        ("rounding", WORD, lambda: scenes.Sensor(rounding=3)),
+        ("name", WORD, lambda: scenes.TargetScene(3)),
+        ("frames", INTEGER, lambda: scenes.TargetScene("people_handheld", frames="3")),
+        ("time_scheme", WORD, lambda: jacoflow.observability(GOOD, time_scheme=3)),
+        ("colour", WORD, lambda: io.frames("a.png", colour=3)),
+        ("stop", INTEGER, lambda: io.frames("a.png", stop="3")),
+        ("channel", INTEGER, lambda: io.frames("a.tif", channel="3")),
+        ("source", PATH, lambda: io.frames(3)),
+        ("source", PATH, lambda: io.frames(["a.png"])),
+        ("path", PATH, lambda: io.read_image(3)),
+        ("path", PATH, lambda: io.read_flo(3)),
+        ("path", PATH, lambda: io.write_pfm(3, GOOD[0])),
+        ("path", PATH, lambda: io.read_disparity(3)),
+        ("path", PATH, lambda: io.write_frames(3, GOOD)),
+        ("path", PATH, lambda: FIELD.save(3)),
+        ("path", PATH, lambda: FlowField.load(3)),
+        ("path", PATH, lambda: FlowFilter().load(3)),
+    ],
+)
+def test_arguments_of_another_type_are_named(argument, expected, call):
+    with pytest.raises(TypeError, match=rf"^{argument}: expected {expected}.*, got (int|str|list)\b"):
+        call()
+
+
+def test_the_path_of_a_video_is_named():
+    pytest.importorskip("av")
+    with pytest.raises(TypeError, match=f"^path: expected {PATH}, got int$"):
+        video.frames(3)
+
+
+def test_the_type_of_a_mask_is_named():
+    mask = np.full((24, 32), 255, np.uint8)
+    for call in (FIELD.region_mean, FIELD.measure):
+        with pytest.raises(TypeError, match=r"^region: expected a boolean mask \(H, W\) or corners \(N, 2\), got uint8 of shape \(24, 32\)$"):
+            call("u", mask)
+        call("u", mask > 0)
+
+
+@pytest.mark.parametrize(("frames", "got"), [((GOOD,), "one argument"), ([*GOOD, GOOD[0]], "4 arguments")])
+def test_flow_takes_two_or_three_frames(frames, got):
+    message = rf"^first, second, third: expected two or three frames \(H, W\), got {got}; for a stack .* call jacoflow.estimate\(frames\)$"
+    with pytest.raises(TypeError, match=message):
+        jacoflow.flow(*frames)

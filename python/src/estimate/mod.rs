@@ -230,7 +230,7 @@ macro_rules! define_estimate {
         pub fn estimate(
             frames: &Bound<'_, PyAny>,
             more: &Bound<'_, PyTuple>,
-            ends: &str,
+            #[pyo3(from_py_with = named::ends)] ends: &str,
             #[pyo3(from_py_with = named::pairs)] pairs: bool,
             $(#[pyo3(from_py_with = named::$option)] $option: $taken,)*
             progress: Option<&Bound<'_, PyAny>>,
@@ -262,14 +262,21 @@ macro_rules! define_estimate {
         /// >>> jacoflow.flow(a, b).shape
         /// (64, 96)
         #[pyfunction]
-        #[pyo3(signature = (first, second, third = None, *, $($option = $default,)*))]
+        #[pyo3(signature = (first, second = None, third = None, *more, $($option = $default,)*))]
         pub fn flow(
             first: &Bound<'_, PyAny>,
-            second: &Bound<'_, PyAny>,
+            second: Option<&Bound<'_, PyAny>>,
             third: Option<&Bound<'_, PyAny>>,
+            more: &Bound<'_, PyTuple>,
             $(#[pyo3(from_py_with = named::$option)] $option: $taken,)*
         ) -> Outcome<FlowField> {
-            let frames: Vec<_> = [Some(first), Some(second), third].into_iter().flatten().collect();
+            if second.is_none() || !more.is_empty() {
+                let got = 1 + [second, third].into_iter().flatten().count() + more.len();
+                let got = if got == 1 { "one argument".into() } else { format!("{got} arguments") };
+                return Err(PyTypeError::new_err(format!("first, second, third: expected two or three frames (H, W), \
+                    got {got}; for a stack or a list of frames call jacoflow.estimate(frames)")).into());
+            }
+            let frames: Vec<_> = [Some(first), second, third].into_iter().flatten().collect();
             estimate_one(&PyList::new(first.py(), frames)?, Arguments { $($option: $option.into()),* })
         }
     };

@@ -4,7 +4,7 @@ use super::{arguments::Arguments, arguments::estimator_options};
 use crate::arrays::{self, ColourRule};
 use crate::errors::Outcome;
 use crate::interrupt::{alone, interruptible};
-use crate::options::{self, Integer, Object};
+use crate::options::{self, Integer, Object, named};
 use crate::{field::FlowField, image::renamed, keywords::constructor, keywords::with_common};
 use jacoflow::error::Error;
 use jacoflow::temporal::{AnyFlowStream, FlowStream, Stream};
@@ -53,7 +53,11 @@ impl FlowEstimator {
     /// another size or a time not after the last, TypeError for another dtype) is not kept. Ctrl-C stops the
     /// work and forgets every frame.
     #[pyo3(signature = (frame, *, time=None))]
-    fn push(slf: &Bound<'_, Self>, frame: &Bound<'_, PyAny>, time: Option<f64>) -> Outcome<Option<FlowField>> {
+    fn push(
+        slf: &Bound<'_, Self>,
+        frame: &Bound<'_, PyAny>,
+        #[pyo3(from_py_with = named::time)] time: Option<f64>,
+    ) -> Outcome<Option<FlowField>> {
         let (py, mut this) = (slf.py(), alone(slf)?);
         let (frame, dtype) = arrays::typed_frame("frame", frame, this.colour)?;
         let (stream, mut completed) = (&mut this.stream, false);

@@ -116,7 +116,7 @@ impl FlowField {
         py: Python<'_>,
         #[pyo3(from_py_with = named::name)] name: String,
         region: Option<&Bound<'_, PyAny>>,
-        aggregate: Option<&str>,
+        #[pyo3(from_py_with = named::aggregate)] aggregate: Option<&str>,
     ) -> Outcome<(f64, f64, usize)> {
         if self.stack {
             return Err(

@@ -2,7 +2,7 @@
 
 use super::{FlowField, Slice, Store, each, state};
 use crate::errors::Outcome;
-use crate::{arrays, io, keywords::getters};
+use crate::{arrays, io, keywords::getters, options::named};
 use jacoflow::types::{SamplingGrid, Status};
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::prelude::*;
@@ -126,7 +126,12 @@ impl FlowField {
     /// A stack goes to a folder (`path` without extension) as flow_000001.npz, ... by frame index. `options`
     /// is free text kept in .npz. OSError when the file cannot be written, ValueError for another extension.
     #[pyo3(signature = (path, *, options=""))]
-    fn save(&self, py: Python<'_>, path: PathBuf, options: &str) -> Outcome<()> {
+    fn save(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = named::path)] path: PathBuf,
+        #[pyo3(from_py_with = named::options)] options: &str,
+    ) -> Outcome<()> {
         io::save_field(py, self, &path, options)
     }
 
@@ -146,7 +151,7 @@ impl FlowField {
         flow: &Bound<'_, PyAny>,
         covariance: Option<&Bound<'_, PyAny>>,
         jacobian: Option<&Bound<'_, PyAny>>,
-        interval: Option<&str>,
+        #[pyo3(from_py_with = named::interval)] interval: Option<&str>,
     ) -> Outcome<Self> {
         state::from_arrays(flow, covariance, jacobian, interval)
     }
@@ -154,7 +159,7 @@ impl FlowField {
     /// Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError
     /// for a damaged file.
     #[staticmethod]
-    fn load(py: Python<'_>, path: PathBuf) -> Outcome<Self> {
+    fn load(py: Python<'_>, #[pyo3(from_py_with = named::path)] path: PathBuf) -> Outcome<Self> {
         io::load_field(py, &path)
     }
 

@@ -1,7 +1,7 @@
 //! `MerweScaledSigmaPoints`.
 
 use crate::errors::Outcome;
-use crate::options::{Integer, count};
+use crate::options::{Argument, Integer, count, named};
 use crate::{arrays, keywords::getters};
 use jacoflow::error::Error;
 use jacoflow::filter::{SigmaPoints, check_dimension};
@@ -34,11 +34,20 @@ getters! {
     Wc(this, slf) -> Outcome<Bound<'py, PyAny>> = arrays::owned(slf.py(), &[SigmaPoints::count(this.n)], this.points.covariance_weights(this.n));
 }
 
+impl Argument for MerweScaledSigmaPoints {
+    const EXPECTED: &'static str = "MerweScaledSigmaPoints";
+}
+
 #[pymethods]
 impl MerweScaledSigmaPoints {
     #[new]
     #[pyo3(signature = (n, alpha=None, beta=None, kappa=None))]
-    fn new(n: Integer, alpha: Option<f64>, beta: Option<f64>, kappa: Option<f64>) -> Outcome<Self> {
+    fn new(
+        #[pyo3(from_py_with = named::n)] n: Integer,
+        #[pyo3(from_py_with = named::alpha)] alpha: Option<f64>,
+        #[pyo3(from_py_with = named::beta)] beta: Option<f64>,
+        #[pyo3(from_py_with = named::kappa)] kappa: Option<f64>,
+    ) -> Outcome<Self> {
         let n = count("n", n)?;
         let default = SigmaPoints::default();
         let (alpha, beta, kappa) =

@@ -77,7 +77,7 @@ impl UnscentedKalmanFilter {
         dt: &Bound<'_, PyAny>,
         hx: Py<PyAny>,
         fx: Py<PyAny>,
-        points: MerweScaledSigmaPoints,
+        #[pyo3(from_py_with = named::points)] points: MerweScaledSigmaPoints,
         x_mean: Option<Py<PyAny>>,
         z_mean: Option<Py<PyAny>>,
         residual_x: Option<Py<PyAny>>,

@@ -5,7 +5,7 @@ mod arguments;
 use super::arrays::{self, ColourRule};
 use super::estimate::Growing;
 use super::frame_list::Frames;
-use super::options::{self, Integer, Object, PreprocessOptions};
+use super::options::{self, Integer, Object, PreprocessOptions, named};
 use super::{field::FlowField, keywords::constructor, keywords::with_common};
 use crate::errors::Outcome;
 use crate::image::renamed;
@@ -129,7 +129,7 @@ impl FlowFilter {
     ///
     /// Pickling keeps the options too. ValueError before the first frame, OSError when the file cannot be
     /// written.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> Outcome<()> {
+    fn save(&self, py: Python<'_>, #[pyo3(from_py_with = named::path)] path: PathBuf) -> Outcome<()> {
         Ok(py.detach(|| self.filter.save(&path))?)
     }
 
@@ -138,7 +138,7 @@ impl FlowFilter {
     ///
     /// FormatError for a damaged file, ValueError for a file of other options or another precision, OSError
     /// when it cannot be read.
-    fn load(&mut self, py: Python<'_>, path: PathBuf) -> Outcome<()> {
+    fn load(&mut self, py: Python<'_>, #[pyo3(from_py_with = named::path)] path: PathBuf) -> Outcome<()> {
         Ok(py.detach(|| self.filter.load(&path))?)
     }
 

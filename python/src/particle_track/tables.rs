@@ -2,6 +2,7 @@
 
 use super::step::PyParticleStep;
 use crate::errors::Outcome;
+use crate::options::named;
 use jacoflow::error::{Error, Result};
 use jacoflow::io::{MotTable, TrackTable};
 use jacoflow::pipeline::ParticleRows;
@@ -10,7 +11,12 @@ use std::path::{Path, PathBuf};
 
 /// Writes steps to a file: "mot" or "csv".
 #[pyfunction(name = "_write_particle_tracks")]
-pub fn write_tables(py: Python<'_>, path: PathBuf, format: &str, steps: Vec<Py<PyParticleStep>>) -> Outcome<()> {
+pub fn write_tables(
+    py: Python<'_>,
+    #[pyo3(from_py_with = named::path)] path: PathBuf,
+    format: &str,
+    steps: Vec<Py<PyParticleStep>>,
+) -> Outcome<()> {
     let steps: Vec<&PyParticleStep> = steps.iter().map(Py::get).collect();
     Ok(py.detach(|| match format {
         "mot" => write_mot(&path, &steps),

@@ -8,7 +8,7 @@ use crate::options::{Integer, count, named, threads};
 use jacoflow::error::Error;
 use jacoflow::filter::check_mean;
 use jacoflow::filter::particle::ParticleFilter as Core;
-use pyo3::exceptions::PyOverflowError;
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::sync::Mutex;
@@ -109,6 +109,10 @@ fn id(value: &Bound<'_, PyAny>) -> Outcome<u64> {
         if error.is_instance_of::<PyOverflowError>(value.py()) {
             return Error::argument("ids", "integers from 0 to 2^64 - 1", value).into();
         }
+        if error.is_instance_of::<PyTypeError>(value.py()) {
+            let got = arrays::kind_of(value);
+            return PyTypeError::new_err(format!("ids: expected integers, got {got}")).into();
+        }
         error.into()
     })
 }
@@ -132,7 +136,10 @@ impl ParticleFilter {
             Core::new(batch.unwrap_or(1), n_particles, dim_x, random_state.map(seed).transpose()?.unwrap_or(0))?;
         core.threads = self::threads(threads)?;
         if let Some(ids) = ids {
-            let count = ids.len()?;
+            let wrong = |_| {
+                PyTypeError::new_err(format!("ids: expected {} integers, got {}", core.batch, arrays::kind_of(ids)))
+            };
+            let count = ids.len().map_err(wrong)?;
             if count != core.batch {
                 return Err(Error::argument("ids", format!("{} integers", core.batch), count).into());
             }

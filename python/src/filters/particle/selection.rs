@@ -23,7 +23,7 @@ pub fn resample<'py>(
     py: Python<'py>,
     weights: &Bound<'py, PyAny>,
     #[pyo3(from_py_with = named::n)] n: Option<Integer>,
-    scheme: &str,
+    #[pyo3(from_py_with = named::scheme)] scheme: &str,
     uniforms: Option<&Bound<'py, PyAny>>,
     #[pyo3(from_py_with = named::random_state)] random_state: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {

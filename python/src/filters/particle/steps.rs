@@ -139,7 +139,7 @@ impl ParticleFilter {
     fn resample<'py>(
         &self,
         py: Python<'py>,
-        scheme: &str,
+        #[pyo3(from_py_with = named::scheme)] scheme: &str,
         #[pyo3(from_py_with = named::threshold)] threshold: Option<f64>,
         #[pyo3(from_py_with = named::n_particles)] n_particles: Option<Integer>,
     ) -> Outcome<Bound<'py, PyAny>> {
