@@ -5,7 +5,8 @@ use super::arguments::{
 };
 use super::flow::{Prepared, prepare_with_covariance};
 use super::interrupt::Watch;
-use super::open::{compute, open_input, refuse_inputs};
+use super::open::{compute, open_input};
+use super::paths::CommandPaths;
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow, table_target};
 use crate::error::{Error, Result};
@@ -92,14 +93,15 @@ pub struct EgomotionCommand {
 impl EgomotionCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
-        let outputs = [
-            ("output", &self.output),
-            ("alternatives", &self.alternatives),
-            ("picture", &self.picture),
-            ("maps", &self.maps),
-        ];
-        let outputs = outputs.map(|(option, path)| (option, path.as_deref()));
-        refuse_inputs(self.input.input.iter().map(Path::new), &outputs, self.force)?;
+        // Numbers are no file, or one that does not exist.
+        let files = self.grid.files().chain(self.method.initial.as_deref()).chain([Path::new(&self.intrinsics)]);
+        CommandPaths::of_input(&self.input.input)
+            .reading(files)
+            .writing("output", self.output.as_deref())
+            .writing("alternatives", self.alternatives.as_deref())
+            .writing_numbered("picture", self.picture.as_deref(), "egomotion", &["png"])
+            .writing_numbered("maps", self.maps.as_deref(), "contact", &["npz"])
+            .check(self.force)?;
         let plan = self.plan()?;
         let mut opened = open_input(&self.input)?;
         let Prepared { plan: stream, is_double, .. } = prepare_with_covariance(
@@ -170,9 +172,8 @@ impl EgomotionCommand {
     /// Where other motions go.
     fn others(&self) -> Result<Option<TableTarget>> {
         let Some(path) = self.alternatives.as_deref() else { return Ok(None) };
-        let refuse = |got: String| Error::argument("alternatives", "a .csv file of its own", got);
-        if path == Path::new("-") || Some(path) == self.output.as_deref() {
-            return Err(refuse(path.display().to_string()));
+        if path == Path::new("-") {
+            return Err(Error::argument("alternatives", "a .csv file of its own", path.display()));
         }
         table_target(Some(path), self.force, false).map(Some).map_err(|error| error.about("alternatives"))
     }

@@ -4,9 +4,10 @@ use super::arguments::{
     ComputeArguments, FilterArguments, GridArguments, InputArguments, MessageArguments, OutputArguments,
     describe_filter,
 };
-use super::flow::{expect_output, plan_output};
+use super::flow::{expect_output, plan_output, with_output};
 use super::interrupt::Watch;
 use super::open::{Opened, compute, in_double, open_input, preprocess, read_mask};
+use super::paths::{CommandPaths, is_same_file};
 use super::report::{Report, print_message};
 use super::run::{ReportContext, input_details, report, run_pipeline};
 use crate::error::{Error, Result};
@@ -58,12 +59,12 @@ impl FilterCommand {
         if let (Some(_), Some(name)) = (&self.resume, self.filter.given()) {
             return Err(Error::argument(name, "no such option with --resume, whose state has its own", "one"));
         }
-        self.output.refuse_inputs(&self.input.input)?;
+        self.paths()?.check(self.output.force)?;
         let mut opened = open_input(&self.input)?;
         let options = self.options(&mut opened)?;
         let steps = preprocess(&self.input, options.mask.as_ref())?;
         if let Some(path) = self.save_state.as_ref().filter(|path| !self.is_in_new_folder(path)) {
-            check_target(path, self.output.force || self.resume.as_ref() == Some(path))?;
+            check_target(path, self.output.force || self.is_resumed(path))?;
         }
         if let Some(path) = &self.resume {
             return self.resume(path, opened, &options, steps, watch);
@@ -74,6 +75,20 @@ impl FilterCommand {
         } else {
             self.run(opened, FilterStage::<f32>::new(options, steps), watch)
         }
+    }
+
+    /// What the command reads and writes. The state that it resumes may be replaced by that which it saves.
+    fn paths(&self) -> Result<CommandPaths> {
+        let is_replaced = |path: &&Path| self.save_state.as_deref().is_some_and(|saved| is_same_file(saved, path));
+        let resumed = self.resume.as_deref().filter(|path| !is_replaced(path));
+        let paths = CommandPaths::of_input(&self.input.input).reading(self.grid.files().chain(resumed));
+        let paths = with_output(paths, &self.output, !self.grid.points.is_empty())?;
+        Ok(paths.writing("save_state", self.save_state.as_deref()))
+    }
+
+    /// Whether a path is that of the state that the filter starts from.
+    fn is_resumed(&self, path: &Path) -> bool {
+        self.resume.as_deref().is_some_and(|resumed| is_same_file(resumed, path))
     }
 
     /// Whether a file is to lie in the folder of the results, which is made before anything is written.

@@ -5,6 +5,7 @@ use super::arguments::{
 };
 use super::interrupt::Watch;
 use super::open::{Opened, compute, in_double, open_input, preprocess, read_initial, read_mask};
+use super::paths::CommandPaths;
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow};
 use crate::error::{Error, Result};
@@ -113,6 +114,14 @@ pub fn prepare_with_covariance(
     Ok(prepared)
 }
 
+/// Adds the paths of `output` to those of a command; `points`: results are for a list of points.
+pub fn with_output(paths: CommandPaths, output: &OutputArguments, points: bool) -> Result<CommandPaths> {
+    let Some(given) = output.output.as_deref() else { return Ok(paths) };
+    let plan = decide_output(output, points, false, true, None)?;
+    let numbered = plan.field_files().into_iter().chain(plan.picture_files());
+    Ok(paths.writing_files("output", given, plan.single_files(), numbered))
+}
+
 /// Where results go: the user's words, or CSV on standard output for points without any.
 pub fn plan_output(
     output: &OutputArguments,
@@ -121,23 +130,33 @@ pub fn plan_output(
     fields: Option<usize>,
 ) -> Result<OutputPlan> {
     let points = matches!(sites, SamplingGrid::Points(_));
-    let standard_output = points && output.output.is_none() && !json;
-    let path = if standard_output { Some(Path::new("-")) } else { output.output.as_deref() };
-    let csv = vec!["csv".to_string()];
-    // The name of a file says its format.
-    let is_file = path.is_some_and(|path| path != Path::new("-") && !is_folder(path));
-    let plan = OutputPlan::decide(&OutputWish {
-        path,
-        formats: if points && output.format.is_empty() && !is_file { &csv } else { &output.format },
-        pictures: &output.picture,
-        replace: output.force,
-        fields,
-    })?;
+    let plan = decide_output(output, points, json, output.force, fields)?;
     plan.check_sites(sites)?;
     if json && plan.table == Some(TableTarget::StandardOutput) {
         return Err(Error::argument("output", "a file or folder, as --json needs standard output", "-"));
     }
     Ok(plan)
+}
+
+fn decide_output(
+    output: &OutputArguments,
+    points: bool,
+    json: bool,
+    replace: bool,
+    fields: Option<usize>,
+) -> Result<OutputPlan> {
+    let standard_output = points && output.output.is_none() && !json;
+    let path = if standard_output { Some(Path::new("-")) } else { output.output.as_deref() };
+    let csv = vec!["csv".to_string()];
+    // The name of a file says its format.
+    let is_file = path.is_some_and(|path| path != Path::new("-") && !is_folder(path));
+    OutputPlan::decide(&OutputWish {
+        path,
+        formats: if points && output.format.is_empty() && !is_file { &csv } else { &output.format },
+        pictures: &output.picture,
+        replace,
+        fields,
+    })
 }
 
 /// Refuses to compute what nobody would see: without a place for results only the summary of `--json` is
@@ -154,7 +173,9 @@ pub fn expect_output(plan: &OutputPlan, json: bool, has_other: bool) -> Result<(
 impl FlowCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
-        self.output.refuse_inputs(&self.input.input)?;
+        let files = self.grid.files().chain(self.method.initial.as_deref());
+        let paths = CommandPaths::of_input(&self.input.input).reading(files);
+        with_output(paths, &self.output, !self.grid.points.is_empty())?.check(self.output.force)?;
         let mut opened = open_input(&self.input)?;
         let Prepared { plan: stream, is_double, description } =
             prepare(&mut opened, &self.input, &self.method, &self.grid, &self.compute)?;

@@ -3,7 +3,8 @@
 use super::arguments::{ComputeArguments, GridArguments, InputArguments, MessageArguments, MethodArguments};
 use super::flow::{Prepared, prepare_with_covariance};
 use super::interrupt::Watch;
-use super::open::{open_input, refuse_inputs};
+use super::open::open_input;
+use super::paths::CommandPaths;
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow, table_target};
 use crate::error::{Error, Result};
@@ -12,7 +13,7 @@ use crate::pipeline::{MeasuredRegion, Measurements};
 use crate::types::Region;
 use clap::Args;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Options of `measure`.
 #[derive(Debug, Args)]
@@ -65,8 +66,9 @@ impl MeasureCommand {
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let quantities: Vec<Measured> =
             self.quantity.iter().map(|name| Measured::parse(&name.replace('-', "_"))).collect::<Result<_>>()?;
-        let output = [("output", self.output.as_deref())];
-        refuse_inputs(self.input.input.iter().map(Path::new), &output, self.force)?;
+        let files = self.grid.files().chain(self.method.initial.as_deref());
+        let paths = CommandPaths::of_input(&self.input.input).reading(files);
+        paths.writing("output", self.output.as_deref()).check(self.force)?;
         let target = table_target(self.output.as_deref(), self.force, self.messages.json)?;
         let mut opened = open_input(&self.input)?;
         if let Some(quantity) = quantities.iter().find(|q| q.needs_fps() && opened.numbering.rate.is_none()) {

@@ -17,6 +17,7 @@ mod info;
 mod interrupt;
 mod measure;
 mod open;
+mod paths;
 mod progress;
 mod report;
 mod run;

@@ -73,30 +73,6 @@ fn looked_at<F: FrameFormat>(source: Box<dyn FrameSource<F>>, arguments: &InputA
     Ok(Opened { source, first, frames, numbering, has_own_rate, pixel_size, name })
 }
 
-/// Refuses to replace what is read, which not even `force` is meant for; `outputs` by their options.
-pub fn refuse_inputs<'a>(
-    inputs: impl Iterator<Item = &'a Path>,
-    outputs: &[(&'static str, Option<&Path>)],
-    force: bool,
-) -> Result<()> {
-    // A pattern stands for what it matches.
-    let matched = |input: &Path| match input.canonicalize() {
-        Ok(path) => vec![path],
-        Err(_) => glob::glob(&input.to_string_lossy())
-            .map(|paths| paths.flatten().filter_map(|path| path.canonicalize().ok()).collect())
-            .unwrap_or_default(),
-    };
-    let inputs: Vec<PathBuf> = inputs.flat_map(matched).collect();
-    for (option, path) in outputs {
-        let Some((path, output)) = path.and_then(|path| Some((path, path.canonicalize().ok()?))) else { continue };
-        let is_read = |input: &PathBuf| *input == output || force && input.parent() == Some(&output);
-        if inputs.iter().any(is_read) {
-            return Err(Error::argument(option, "another place than the input", path.display()));
-        }
-    }
-    Ok(())
-}
-
 /// One specification, or several image files in the order given.
 pub fn open_source(input: &[String], options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     match input {

@@ -2,7 +2,7 @@
 
 use super::arguments::{LayoutArguments, MessageArguments, SearchArguments, SelectionArguments, ThreadArguments};
 use super::interrupt::Watch;
-use super::open::refuse_inputs;
+use super::paths::CommandPaths;
 use super::progress::Bar;
 use super::report::{Report, print_message};
 use crate::error::{Error, Result};
@@ -94,10 +94,9 @@ struct Done {
 impl StereoCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
-        let outputs = [("output", self.output.as_deref()), ("picture", self.picture.as_deref())];
-        refuse_inputs(self.input.iter().map(Path::new), &outputs, self.force)?;
         let options = self.options()?;
         let formats = self.formats()?;
+        self.paths(&formats).check(self.force)?;
         self.check_output(&formats)?;
         let (views, numbering) = self.layout.open(&self.input, &self.selection, None)?;
         let mut pairs = GreyPairs::start(views, Preprocess::default(), options.threads)?;
@@ -154,6 +153,22 @@ impl StereoCommand {
             }
             None => Err(Error::argument("output", "a folder, or a .npz, .pfm or .png file", output.display())),
         }
+    }
+
+    /// What the command reads and writes.
+    fn paths(&self, formats: &[DisparityFormat]) -> CommandPaths {
+        let paths = CommandPaths::of_input(&self.input);
+        let paths = match self.output.as_deref() {
+            Some(folder) if is_folder(folder) => paths.writing_files("output", folder, [], Self::maps(folder, formats)),
+            file => paths.writing("output", file),
+        };
+        paths.writing_numbered("picture", self.picture.as_deref(), "stereo", &["png"])
+    }
+
+    /// The files of disparities in a folder.
+    fn maps(folder: &Path, formats: &[DisparityFormat]) -> Vec<NumberedFiles> {
+        let files = |format: &DisparityFormat| NumberedFiles::named(folder, "disparity", format.extension());
+        formats.iter().map(files).collect()
     }
 
     /// Refuses what could only fail after work has been done.

@@ -3,12 +3,13 @@
 use super::arguments::{ComputeArguments, MessageArguments, parse_not_negative, parse_rate, parse_size};
 use super::interrupt::Watch;
 use super::open::compute;
+use super::paths::CommandPaths;
 use super::progress::Bar;
 use super::report::{Report, print_message};
 use super::scene_list;
 use super::target_recording::{TargetRecording, check_folder};
 use crate::error::{Error, Result};
-use crate::io::{FieldFormat, check_sink, open_sink};
+use crate::io::{FieldFormat, NumberedFiles, check_sink, open_sink};
 use crate::parallel::{Progress, Threads};
 use crate::pipeline::{check_target, is_folder};
 use crate::synth::targets::{SCENES, TargetSceneOptions};
@@ -144,6 +145,12 @@ impl SynthCommand {
         )?;
         let formats = self.truth_formats()?;
         let (threads, _) = compute(&self.compute)?;
+        let truth_files: Vec<NumberedFiles> = formats.iter().filter_map(|format| self.truth_files(*format)).collect();
+        let paths = CommandPaths::default().writing_pictures("output", Some(output), "frame");
+        match &self.truth {
+            Some(folder) => paths.writing_files("truth", folder, [], truth_files).check(self.force)?,
+            None => paths.check(self.force)?,
+        }
         self.check_output(output)?;
         let bar = Bar::new(watch, "synth", self.messages.quiet);
         let written = self.write(&*scene, output, &formats, threads, &bar);
@@ -220,11 +227,12 @@ impl SynthCommand {
                 bar.step(index, self.count())?;
                 let frame = threads.install(|| scene.frame(index as f64));
                 recording.write(&self.sample(&frame, index as u64))?;
-                if let Some(folder) = &self.truth {
+                if self.truth.is_some() {
                     let field = threads.install(|| truth(scene, index as f64))?;
                     for format in formats {
-                        let path = folder.join(format!("{index:06}.{}", format.extension()));
-                        format.write(path, &field, "")?;
+                        if let Some(files) = self.truth_files(*format) {
+                            format.write(files.path(index), &field, "")?;
+                        }
                     }
                 }
                 done = index + 1;
@@ -257,6 +265,11 @@ impl SynthCommand {
                 AnyFrame::U16(sensor.apply(frame, index).map(to_level))
             }
         }
+    }
+
+    /// The files of the truth in one format.
+    fn truth_files(&self, format: FieldFormat) -> Option<NumberedFiles> {
+        self.truth.as_ref().map(|folder| NumberedFiles::without_stem(folder, format!(".{}", format.extension())))
     }
 
     fn truth_formats(&self) -> Result<Vec<FieldFormat>> {

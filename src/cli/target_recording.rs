@@ -1,6 +1,6 @@
 //! Recordings of scenes of targets, for `jacoflow synth`: colour frames and the true boxes.
 
-use super::{interrupt::Watch, progress::Bar, report::Report, report::print_message};
+use super::{interrupt::Watch, paths::CommandPaths, progress::Bar, report::Report, report::print_message};
 use crate::error::{Error, Result};
 use crate::io::{MotTable, check_sink, open_colour_sink};
 use crate::parallel::{Progress, Threads};
@@ -73,6 +73,10 @@ impl TargetRecording<'_> {
 
     /// Refuses what could only fail after work has been done.
     fn check_output(&self) -> Result<()> {
+        CommandPaths::default()
+            .writing_pictures("output", Some(self.output), "frame")
+            .writing("boxes", self.boxes)
+            .check(self.force)?;
         check_sink(&self.output.to_string_lossy())?;
         if let Some(boxes) = self.boxes {
             check_target(boxes, self.force)?;

@@ -11,12 +11,13 @@ use super::arguments::{
     ThreadArguments, TrackerArguments,
 };
 use super::interrupt::Watch;
-use super::open::refuse_inputs;
+use super::paths::CommandPaths;
 use super::report::Report;
 use crate::error::{Error, Result};
+use crate::pipeline::{StereoFormat, TrackFormat};
 use clap::Args;
 use output::TrackOutputArguments;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Options of `track`.
 #[derive(Debug, Args)]
@@ -62,7 +63,8 @@ pub struct TrackCommand {
 impl TrackCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
-        self.refuse_the_input_as_output()?;
+        let method = self.tracker.method()?;
+        self.paths(method).check(self.output.force)?;
         if self.output.enlarge > 1 && self.output.overlay.is_none() && self.stereo.disparity_overlay.is_none() {
             return Err(Error::argument(
                 "enlarge",
@@ -70,27 +72,31 @@ impl TrackCommand {
                 self.output.enlarge,
             ));
         }
-        match self.tracker.method()? {
+        match method {
             "stereo" => self.follow_everything(watch),
             "particle" => self.follow_by_particles(watch),
             _ => self.follow_targets(watch),
         }
     }
 
-    /// Refuses to replace what is read: not even `--force` is meant for that.
-    fn refuse_the_input_as_output(&self) -> Result<()> {
-        let boxes = self.particle.box_file.iter().map(PathBuf::as_path);
-        let given = self.input.input.iter().map(Path::new).chain(boxes);
-        let outputs = [
-            ("overlay", &self.output.overlay),
-            ("disparity-overlay", &self.stereo.disparity_overlay),
-            ("graph", &self.stereo.graph),
-            ("foreground", &self.particle.foreground),
-            ("mot", &self.particle.mot),
-            ("csv", &self.particle.csv),
-            ("output", &self.output.output),
-        ];
-        refuse_inputs(given, &outputs.map(|(option, path)| (option, path.as_deref())), self.output.force)
+    /// What the command reads and writes.
+    fn paths(&self, method: &str) -> CommandPaths {
+        let files = self.particle.box_file.iter().chain(&self.stereo.times);
+        let mut paths = CommandPaths::of_input(&self.input.input).reading(files.map(PathBuf::as_path));
+        if let Some(output) = &self.output.output {
+            let texts = match method {
+                "stereo" => self.output.files::<StereoFormat>(output),
+                _ => self.output.files::<TrackFormat>(output),
+            };
+            paths = paths.writing_files("output", output, texts, []);
+        }
+        paths
+            .writing_pictures("overlay", self.output.overlay.as_deref(), "track")
+            .writing_pictures("disparity-overlay", self.stereo.disparity_overlay.as_deref(), "stereo")
+            .writing_pictures("foreground", self.particle.foreground.as_deref(), "foreground")
+            .writing("graph", self.stereo.graph.as_deref())
+            .writing("mot", self.particle.mot.as_deref())
+            .writing("csv", self.particle.csv.as_deref())
     }
 
     /// Refuses an option that belongs to another method.

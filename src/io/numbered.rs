@@ -7,12 +7,12 @@
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
-/// Names `folder/stem_000123.extension`.
+/// Names `folder/stem_000123.extension`, or `folder/000123` with an ending.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NumberedFiles {
     folder: PathBuf,
-    stem: String,
-    extension: String,
+    prefix: String,
+    ending: String,
 }
 
 impl NumberedFiles {
@@ -23,7 +23,23 @@ impl NumberedFiles {
     pub fn create(folder: impl AsRef<Path>, stem: &str, extension: &str) -> Result<Self> {
         let folder = folder.as_ref();
         std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
-        Ok(Self { folder: folder.to_path_buf(), stem: stem.into(), extension: extension.into() })
+        Ok(Self::named(folder, stem, extension))
+    }
+
+    /// As [`NumberedFiles::create`], of a folder that is not made.
+    pub fn named(folder: impl Into<PathBuf>, stem: &str, extension: &str) -> Self {
+        Self { folder: folder.into(), prefix: format!("{stem}_"), ending: format!(".{extension}") }
+    }
+
+    /// Names without a stem: `folder/000123` and `ending`, such as `.npz` or `_curl.png`. The folder is not
+    /// made.
+    pub fn without_stem(folder: impl Into<PathBuf>, ending: impl Into<String>) -> Self {
+        Self { folder: folder.into(), prefix: String::new(), ending: ending.into() }
+    }
+
+    /// The same names in another folder.
+    pub fn moved_to(self, folder: impl Into<PathBuf>) -> Self {
+        Self { folder: folder.into(), ..self }
     }
 
     /// Removes the files of an earlier run, which would be read as part of this one: those with these names,
@@ -35,23 +51,23 @@ impl NumberedFiles {
         let entries = std::fs::read_dir(&self.folder).map_err(|e| Error::io(&self.folder, e))?;
         for entry in entries {
             let path = entry.map_err(|e| Error::io(&self.folder, e))?.path();
-            if path.file_name().and_then(|name| name.to_str()).is_some_and(|name| self.is_own(name)) && path.is_file() {
+            if self.index(&path).is_some() && path.is_file() {
                 std::fs::remove_file(&path).map_err(|e| Error::io(&path, e))?;
             }
         }
         Ok(())
     }
 
-    /// Whether [`NumberedFiles::path`] gives this name to a frame.
-    fn is_own(&self, name: &str) -> bool {
-        let ending = format!(".{}", self.extension);
-        let rest = name.strip_prefix(&self.stem).and_then(|rest| rest.strip_prefix('_'));
-        let number = rest.and_then(|rest| rest.strip_suffix(&ending)).unwrap_or_default();
-        number.len() >= 6 && number.bytes().all(|digit| digit.is_ascii_digit())
+    /// The frame that [`NumberedFiles::path`] gives this path to, if any.
+    pub fn index(&self, path: &Path) -> Option<usize> {
+        let name = path.file_name()?.to_str()?;
+        let number = name.strip_prefix(&self.prefix)?.strip_suffix(&self.ending)?;
+        let is_number = number.len() >= 6 && number.bytes().all(|digit| digit.is_ascii_digit());
+        if is_number && path.parent() == Some(&self.folder) { number.parse().ok() } else { None }
     }
 
     /// The name for the frame `index`: six digits, more where needed.
     pub fn path(&self, index: usize) -> PathBuf {
-        self.folder.join(format!("{}_{index:06}.{}", self.stem, self.extension))
+        self.folder.join(format!("{}{index:06}{}", self.prefix, self.ending))
     }
 }

@@ -2,7 +2,7 @@
 
 use super::sink::TableTarget;
 use crate::error::{Error, Result};
-use crate::io::FieldFormat;
+use crate::io::{FieldFormat, NumberedFiles};
 use crate::types::{SamplingGrid, choice_by_name, choices};
 use std::path::{Path, PathBuf};
 
@@ -218,28 +218,43 @@ impl OutputPlan {
 
     /// A folder that holds results of an earlier run would end up with a mixture.
     fn refuse_earlier_results(&self, folder: &Path) -> Result<()> {
+        let numbered: Vec<NumberedFiles> = self.field_files().into_iter().chain(self.picture_files()).collect();
         let entries = std::fs::read_dir(folder).map_err(|source| Error::io(folder, source))?;
         for entry in entries {
             let path = entry.map_err(|source| Error::io(folder, source))?.path();
             let in_table = self.table == Some(TableTarget::File(path.clone()));
-            let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-            if in_table || self.is_numbered_result(&name) {
+            if in_table || numbered.iter().any(|files| files.index(&path).is_some()) {
                 return Err(exists(&path));
             }
         }
         Ok(())
     }
 
-    /// Whether this run could write a file of that name.
-    fn is_numbered_result(&self, name: &str) -> bool {
-        let digits = name.bytes().take_while(u8::is_ascii_digit).count();
-        let rest = &name[digits..];
-        let as_field = self.formats.iter().any(|format| rest.strip_prefix('.') == Some(format.extension()));
-        let as_picture = self
-            .pictures
-            .iter()
-            .any(|kind| rest.strip_suffix(".png").is_some_and(|r| r == format!("_{}", kind.name())));
-        digits >= 6 && (as_field || as_picture)
+    /// Names of the fields' files in a folder, one for each format.
+    pub fn field_files(&self) -> Vec<NumberedFiles> {
+        let Place::Folder(folder) = &self.place else { return Vec::new() };
+        let files = |format: &FieldFormat| NumberedFiles::without_stem(folder, format!(".{}", format.extension()));
+        self.formats.iter().map(files).collect()
+    }
+
+    /// Names of the pictures in a folder, one for each kind.
+    pub fn picture_files(&self) -> Vec<NumberedFiles> {
+        let Place::Folder(folder) = &self.place else { return Vec::new() };
+        let files = |kind: &PictureKind| NumberedFiles::without_stem(folder, format!("_{}.png", kind.name()));
+        self.pictures.iter().map(files).collect()
+    }
+
+    /// Files that are not numbered: the table, and the one field with its pictures.
+    pub fn single_files(&self) -> Vec<PathBuf> {
+        let mut files = Vec::new();
+        if let Some(TableTarget::File(table)) = &self.table {
+            files.push(table.clone());
+        }
+        if let Place::Single(_) = &self.place {
+            files.extend(self.formats.iter().filter_map(|format| self.field_path(0, *format)));
+            files.extend(self.pictures.iter().filter_map(|kind| self.picture_path(0, *kind)));
+        }
+        files
     }
 
     /// The file of the field of frame `index` in `format`.

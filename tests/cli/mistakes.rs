@@ -225,6 +225,79 @@ fn what_is_read_is_never_replaced() {
 }
 
 #[test]
+fn no_file_that_a_command_reads_is_written_by_any_option() {
+    let place = Place::new();
+    place.good("synth affine -o in --frames 3 --size 40x32");
+    place.good("synth affine -o s.npy --frames 3 --size 40x32");
+    place.good("flow s.npy -o i.flo");
+    place.good("filter s.npy -o - --points 9,9 --save-state state.npz");
+    fs::create_dir(place.path("out")).unwrap();
+    for (copy, original) in [("m.png", "in/frame_000000.png"), ("out/000001.flo", "i.flo"), ("m_colour.png", "m.png")] {
+        fs::copy(place.path(original), place.path(copy)).unwrap();
+    }
+    fs::write(place.path("l.txt"), "in/frame_000000.png\nin/../in/frame_000001.png\nin/frame_000002.png\n").unwrap();
+    fs::write(place.path("p.csv"), "x,y\n9,9\n").unwrap();
+    fs::write(place.path("k.csv"), "40 0 20\n0 40 16\n0 0 1\n").unwrap();
+    fs::write(place.path("boxes.txt"), "1,1,5,5,9,9,1,-1,-1,-1\n").unwrap();
+    let files = ["s.npy", "i.flo", "m.png", "l.txt", "p.csv", "k.csv", "boxes.txt", "state.npz", "m_colour.png"];
+    let read = || -> Vec<Vec<u8>> {
+        let others = ["in/frame_000000.png", "in/frame_000001.png", "out/000001.flo"];
+        files.iter().chain(&others).map(|name| fs::read(place.path(name)).unwrap()).collect()
+    };
+    let before = read();
+    for (line, option) in [
+        ("filter s.npy --points 9,9 -o q.csv --save-state s.npy", "save_state"),
+        ("filter s.npy --resume state.npz -o ./state.npz --stop 1", "output"),
+        ("filter s.npy --points p.csv -o q.csv --save-state p.csv", "save_state"),
+        ("flow l.txt -o in/frame_000001.png", "output"),
+        ("flow in -o in/frame_000001.png", "output"),
+        ("flow l.txt -o in", "output"),
+        ("flow in --mask m.png -o m.png", "output"),
+        ("flow in --mask m_colour.png -o m.npz --picture colour", "output"),
+        ("flow in --initial i.flo -o out/../i.flo", "output"),
+        ("flow in --initial out/000001.flo -o out --format flo", "output"),
+        ("flow in --points p.csv -o p.csv", "output"),
+        ("measure in --quantity curl --points p.csv -o p.csv", "output"),
+        ("egomotion in --intrinsics k.csv -o k.csv", "output"),
+        ("egomotion in --intrinsics k.csv -o q.csv --alternatives k.csv", "alternatives"),
+        ("track in --method particle --boxes boxes.txt -o boxes.txt", "output"),
+        ("track in --method particle --boxes boxes.txt --mot boxes.txt", "mot"),
+    ] {
+        let line = format!("{line} --force");
+        fails(&place, &line, 2, &[&format!("error: {option}: expected another place than the input")]);
+    }
+    assert!(before == read());
+    assert!(!place.path("q.csv").exists());
+    // The state alone may be replaced by its successor, and what is read may lie beside results.
+    place.good("filter s.npy --resume state.npz -o - --save-state ./state.npz");
+    fs::rename(place.path("m.png"), place.path("out/m.png")).unwrap();
+    place.good("flow in --mask out/m.png --initial out/000001.flo -o out --force");
+}
+
+#[test]
+fn no_file_is_written_by_two_options() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 3 --size 40x32");
+    let files = place.names(".");
+    for (line, option) in [
+        ("filter s.npy --points 5,5 -o x.csv --save-state x.csv", "save_state"),
+        ("filter s.npy --points 5,5 -o x/ --save-state ./x/points.csv", "save_state"),
+        ("filter s.npy -o x/ --save-state x/000001.npz", "save_state"),
+        ("egomotion s.npy --intrinsics 40,40,20,16 -o x.csv --alternatives ./x.csv", "alternatives"),
+        ("track s.npy --method particle --box 5,5,9,9 --mot x --csv ./x", "csv"),
+        ("track s.npy --method particle --box 5,5,9,9 -o x/ --csv x/tracks.csv", "csv"),
+        ("track s.npy --box 5,5,9,9 -o x/ --overlay x/tracks.csv", "overlay"),
+        ("track s.npy --method particle --box 5,5,9,9 --overlay x.y4m --foreground x.y4m", "foreground"),
+        ("synth cars_handheld -o x.npy --boxes x.npy", "boxes"),
+    ] {
+        fails(&place, line, 2, &[&format!("error: {option}: expected a")]);
+    }
+    assert_eq!(place.names("."), files);
+    // Files of different names may lie in one folder.
+    place.good("filter s.npy -o x/ --save-state x/state.npz");
+}
+
+#[test]
 fn scenes_without_end_are_refused() {
     let place = Place::new();
     fails(&place, "synth waves -o w --set speed=1e300", 2, &["speed: expected at most 16 wavelengths a frame"]);

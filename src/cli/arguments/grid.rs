@@ -24,6 +24,12 @@ pub struct GridArguments {
 }
 
 impl GridArguments {
+    /// Files that these arguments read.
+    pub fn files(&self) -> impl Iterator<Item = &Path> {
+        let is_file = |word: &&String| parse_point(word).is_none() && !looks_like_a_point(word);
+        self.points.iter().filter(is_file).map(Path::new).chain(self.mask.as_deref())
+    }
+
     /// The sites these arguments ask for.
     pub fn sampling_grid(&self) -> Result<SamplingGrid> {
         if self.points.is_empty() {

@@ -1,11 +1,9 @@
 //! Where results go.
 
 use super::parse_positive;
-use crate::cli::open::refuse_inputs;
-use crate::error::Result;
 use crate::pipeline::PictureRanges;
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Output, formats and pictures.
 #[derive(Debug, Clone, Args)]
@@ -37,11 +35,6 @@ pub struct OutputArguments {
 }
 
 impl OutputArguments {
-    /// Refuses to replace what is read.
-    pub fn refuse_inputs(&self, inputs: &[String]) -> Result<()> {
-        refuse_inputs(inputs.iter().map(Path::new), &[("output", self.output.as_deref())], self.force)
-    }
-
     /// Ranges of the pictures.
     pub fn ranges(&self) -> PictureRanges {
         PictureRanges { speed: self.max_speed, rate: self.max_rate }

@@ -56,6 +56,16 @@ impl TrackOutputArguments {
         folder.is_some_and(|folder| path.parent() == Some(folder))
     }
 
+    /// The files of texts at `output`; formats of unknown names are left out.
+    pub fn files<F: TextFormat>(&self, output: &Path) -> Vec<PathBuf> {
+        if !is_folder(output) {
+            return vec![output.to_path_buf()];
+        }
+        let formats: Vec<F> = self.format.iter().filter_map(|name| F::parse(name).ok()).collect();
+        let formats = if formats.is_empty() { &F::ALL[..1] } else { &formats };
+        formats.iter().map(|format| in_folder(output, *format)).collect()
+    }
+
     /// The texts to write, checked before any work is done. `has_other`: the summary or pictures are wanted,
     /// so that no text is needed; `json`: standard output is for the summary.
     pub fn wanted<F: TextFormat>(&self, json: bool, has_other: bool) -> Result<Vec<Wanted<F>>> {
@@ -76,11 +86,10 @@ impl TrackOutputArguments {
 
     fn in_folder<F: TextFormat>(&self, folder: &Path, formats: &[F]) -> Result<Vec<Wanted<F>>> {
         let formats = if formats.is_empty() { &F::ALL[..1] } else { formats };
-        let path = |format: F| folder.join(format!("tracks.{}", format.extension()));
         if folder.is_dir() {
-            formats.iter().try_for_each(|format| check_target(&path(*format), self.force))?;
+            formats.iter().try_for_each(|format| check_target(&in_folder(folder, *format), self.force))?;
         }
-        Ok(formats.iter().map(|format| (TableTarget::File(path(*format)), *format)).collect())
+        Ok(formats.iter().map(|format| (TableTarget::File(in_folder(folder, *format)), *format)).collect())
     }
 
     fn in_file<F: TextFormat>(&self, path: &Path, formats: &[F]) -> Result<Vec<Wanted<F>>> {
@@ -114,6 +123,11 @@ impl TrackOutputArguments {
             (_, asked) => asked.as_ref(),
         }
     }
+}
+
+/// The file of a format in a folder.
+fn in_folder<F: TextFormat>(folder: &Path, format: F) -> PathBuf {
+    folder.join(format!("tracks.{}", format.extension()))
 }
 
 fn on_standard_output<F: TextFormat>(formats: &[F], json: bool) -> Result<Vec<Wanted<F>>> {

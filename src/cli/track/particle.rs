@@ -68,11 +68,7 @@ impl TrackCommand {
         for (path, format, option) in given {
             let Some(path) = path else { continue };
             check_target(path, self.output.force).map_err(|error| error.about(option))?;
-            let target = TableTarget::File(path.clone());
-            if wanted.iter().any(|(other, _)| *other == target) {
-                return Err(Error::argument(option, "a file of its own", path.display()));
-            }
-            wanted.push((target, format));
+            wanted.push((TableTarget::File(path.clone()), format));
         }
         Ok(wanted)
     }

@@ -14,6 +14,7 @@ pub(super) const KIND: Kind = Kind {
     name: "ffmpeg",
     accepts: |spec| Path::new(spec).is_file(),
     has_planes: false,
+    members: super::no_members,
     open: |spec, options| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, options.colour)?)),
     open_colour: |spec, options| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, options.grey)?)),
 };

@@ -14,6 +14,7 @@ pub(super) const KIND: Kind = Kind {
         Path::new(spec).is_dir() || (has_extension(spec, EXTENSIONS) && (Path::new(spec).exists() || !is_pattern(spec)))
     },
     has_planes: true,
+    members: |spec| images_in(Path::new(spec)).unwrap_or_default(),
     open: |spec, options| open_files(spec, options.colour, options.planes),
     open_colour: |spec, options| open_files(spec, options.grey, options.planes),
 };

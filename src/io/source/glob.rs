@@ -9,6 +9,7 @@ pub(super) const KIND: Kind = Kind {
     name: "glob",
     accepts: is_pattern,
     has_planes: true,
+    members: |spec| matches(spec).unwrap_or_default(),
     open: |spec, options| Ok(Box::new(FilesSource::new(matches(spec)?, options.colour)?.with_planes(options.planes))),
     open_colour: |spec, options| {
         Ok(Box::new(FilesSource::new(matches(spec)?, options.grey)?.with_planes(options.planes)))

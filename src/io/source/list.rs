@@ -10,6 +10,7 @@ pub(super) const KIND: Kind = Kind {
     name: "list",
     accepts: |spec| has_extension(spec, &["txt", "lst"]),
     has_planes: true,
+    members: |spec| listed(Path::new(spec)).unwrap_or_default(),
     open: |spec, options| {
         Ok(Box::new(FilesSource::new(listed(Path::new(spec))?, options.colour)?.with_planes(options.planes)))
     },

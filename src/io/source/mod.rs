@@ -23,7 +23,7 @@ use super::planes::{PixelSize, PlaneSelection};
 use super::{channels::Colour, channels::Grey};
 use crate::error::{Error, Result};
 use crate::types::{AnyColourFrame, AnyFrame};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// How a source is opened: what to do with colour or grey, which planes of a file with channels or slices are
 /// frames, and the range of frames, `start`, `start + step`, ... below `stop`.
@@ -125,6 +125,8 @@ struct Kind {
     accepts: fn(&str) -> bool,
     /// Whether its files may be TIFF, with channels and slices.
     has_planes: bool,
+    /// The files in what the specification names, where it is not one file; those that can be listed.
+    members: fn(&str) -> Vec<PathBuf>,
     open: fn(&str, &OpenOptions) -> Result<Box<dyn FrameSource>>,
     open_colour: fn(&str, &OpenOptions) -> Result<Box<ColourSource>>,
 }
@@ -182,6 +184,19 @@ fn kind_for(spec: &str, options: &OpenOptions) -> Result<&'static Kind> {
 /// The name of the kind of source that `spec` would be opened as.
 pub fn kind_of(spec: &str) -> Option<&'static str> {
     KINDS.iter().find(|kind| (kind.accepts)(spec)).map(|kind| kind.name)
+}
+
+/// The files that a source of this specification reads: the one named, and those in a folder or a list or
+/// matched by a pattern. What cannot be listed is left out, as opening the source reports it.
+pub fn files_read(spec: &str) -> Vec<PathBuf> {
+    let kind = KINDS.iter().find(|kind| (kind.accepts)(spec));
+    let members = kind.map(|kind| (kind.members)(spec)).unwrap_or_default();
+    std::iter::once(PathBuf::from(spec)).chain(members).collect()
+}
+
+/// The members of what is one file.
+fn no_members(_: &str) -> Vec<PathBuf> {
+    Vec::new()
 }
 
 fn nothing_there(spec: &str) -> Error {

@@ -15,6 +15,7 @@ pub(super) const KIND: Kind = Kind {
     name: "npy",
     accepts: |spec| has_extension(spec, &["npy"]),
     has_planes: false,
+    members: super::no_members,
     open: |spec, options| Ok(Box::new(NpySource::open(spec, options.colour)?)),
     open_colour: |spec, options| Ok(Box::new(NpySource::open(spec, options.grey)?)),
 };

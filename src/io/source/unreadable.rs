@@ -8,6 +8,7 @@ pub(super) const KIND: Kind = Kind {
     name: "unreadable",
     accepts: |spec| Path::new(spec).is_file() && advice(spec).is_some(),
     has_planes: true,
+    members: super::no_members,
     open: refuse,
     open_colour: refuse,
 };

@@ -14,6 +14,7 @@ pub(super) const KIND: Kind = Kind {
     name: "y4m",
     accepts: |spec| spec == "-" || has_extension(spec, &["y4m"]),
     has_planes: false,
+    members: super::no_members,
     open: |spec, options| open_stream(spec, options.colour),
     open_colour: |spec, options| open_stream(spec, options.grey),
 };
