@@ -81,7 +81,8 @@ pub struct EgomotionCommand {
     /// noise: far from 0 on what moves by itself): a folder for contact_000000.npz, ...
     #[arg(long, value_name = "FOLDER", help_heading = "Output")]
     pub maps: Option<PathBuf>,
-    /// Replace files that exist
+    /// Replace files that exist; when the run is complete, what an earlier run left in the folders for
+    /// further frames is removed, from the frame --start on
     #[arg(long, help_heading = "Output")]
     pub force: bool,
     #[command(flatten)]
@@ -166,6 +167,7 @@ impl EgomotionCommand {
             alternatives: self.others()?,
             pictures: self.picture.clone(),
             maps: self.maps.clone(),
+            stale_from: self.force.then_some(self.input.selection.start),
         })
     }
 

@@ -140,7 +140,8 @@ impl FilterCommand {
         let mut details = input_details(&opened, &self.grid);
         details["form"] = options.form.name().into();
         details["save_state"] = serde_json::json!(self.save_state);
-        let plan: OutputPlan = plan_output(&self.output, &options.sites, self.messages.json, opened.frames)?;
+        let start = opened.numbering.start;
+        let plan: OutputPlan = plan_output(&self.output, &options.sites, self.messages.json, opened.frames, start)?;
         expect_output(&plan, self.messages.json, self.save_state.is_some())?;
         let sinks = plan.sinks(description.to_string(), self.output.ranges())?;
         let mut pipeline = Pipeline::<T>::new(Box::new(stage)).with_numbering(opened.numbering).with_sinks(sinks);

@@ -122,15 +122,18 @@ pub fn with_output(paths: CommandPaths, output: &OutputArguments, points: bool) 
     Ok(paths.writing_files("output", given, plan.single_files(), numbered))
 }
 
-/// Where results go: the user's words, or CSV on standard output for points without any.
+/// Where results go: the user's words, or CSV on standard output for points without any. With --force,
+/// results that an earlier run left for frames from `start` on are removed at the end.
 pub fn plan_output(
     output: &OutputArguments,
     sites: &SamplingGrid,
     json: bool,
     fields: Option<usize>,
+    start: usize,
 ) -> Result<OutputPlan> {
     let points = matches!(sites, SamplingGrid::Points(_));
-    let plan = decide_output(output, points, json, output.force, fields)?;
+    let mut plan = decide_output(output, points, json, output.force, fields)?;
+    plan.stale_from = output.force.then_some(start);
     plan.check_sites(sites)?;
     if json && plan.table == Some(TableTarget::StandardOutput) {
         return Err(Error::argument("output", "a file or folder, as --json needs standard output", "-"));
@@ -182,7 +185,8 @@ impl FlowCommand {
         let estimator = stream.estimator();
         let count = |frames: usize| (frames + 1).saturating_sub(estimator.frames_needed());
         let fields = opened.frames.map(|frames| if self.method.pairs { frames / 2 } else { count(frames) });
-        let plan = plan_output(&self.output, &estimator.options().sites, self.messages.json, fields)?;
+        let plan =
+            plan_output(&self.output, &estimator.options().sites, self.messages.json, fields, opened.numbering.start)?;
         expect_output(&plan, self.messages.json, false)?;
         plan.check_parameters(estimator.model().parameters().iter().map(|parameter| parameter.name))?;
         let mut details = input_details(&opened, &self.grid);

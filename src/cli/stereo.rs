@@ -13,6 +13,7 @@ use crate::pipeline::{GreyPair, GreyPairs, Numbering, check_target, is_folder};
 use crate::stereo::{EdgeDisparity, EdgeDisparityOptions, Method, SequenceRows};
 use clap::Args;
 use serde_json::json;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// How views are matched.
@@ -69,7 +70,8 @@ pub struct StereoCommand {
     /// ...
     #[arg(long, value_name = "FOLDER", help_heading = "Output")]
     pub picture: Option<PathBuf>,
-    /// Replace files that exist
+    /// Replace files that exist; when the run is complete, what an earlier run left in the folders for
+    /// further pairs is removed, from the pair --start on
     #[arg(long, help_heading = "Output")]
     pub force: bool,
     #[command(flatten)]
@@ -171,6 +173,16 @@ impl StereoCommand {
         formats.iter().map(files).collect()
     }
 
+    /// Removes what a longer run left in the folders for frames from the first of this one on.
+    fn remove_stale(&self, formats: &[DisparityFormat], numbering: Numbering, pairs: usize) -> Result<()> {
+        let folder = self.output.as_deref().filter(|output| is_folder(output));
+        let mut files = folder.map_or_else(Vec::new, |folder| Self::maps(folder, formats));
+        files.extend(self.picture.iter().map(|folder| NumberedFiles::named(folder, "stereo", "png")));
+        let written: HashSet<usize> = (0..pairs).map(|pair| numbering.index(pair)).collect();
+        let is_kept = |index: usize| index < numbering.start || written.contains(&index);
+        files.iter().try_for_each(|names| names.clear_except(is_kept))
+    }
+
     /// Refuses what could only fail after work has been done.
     fn check_output(&self, formats: &[DisparityFormat]) -> Result<()> {
         for path in self.output.iter().chain(&self.picture) {
@@ -227,7 +239,7 @@ impl StereoCommand {
         if done.pairs == 0 {
             return Err(Error::argument("input", "at least one pair of views", "none"));
         }
-        Ok(())
+        if self.force { self.remove_stale(formats, numbering, done.pairs) } else { Ok(()) }
     }
 
     /// Writes the disparities of one pair.

@@ -237,7 +237,9 @@ impl SynthCommand {
                 }
                 done = index + 1;
             }
-            recording.finish()
+            recording.finish()?;
+            let mut truth_files = formats.iter().filter_map(|format| self.truth_files(*format));
+            truth_files.try_for_each(|files| files.clear_except(|index| index < done))
         })();
         // One file appears whole or not at all; of a folder what was complete stays.
         let kept = if result.is_err() && !is_folder(output) { 0 } else { done };

@@ -48,10 +48,21 @@ impl NumberedFiles {
     /// # Errors
     /// [`Error::Io`] when the folder cannot be read or a file not removed.
     pub fn clear(&self) -> Result<()> {
+        self.clear_except(|_| false)
+    }
+
+    /// As [`NumberedFiles::clear`], without the numbers that `is_kept`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] when the folder cannot be read or a file not removed.
+    pub fn clear_except(&self, is_kept: impl Fn(usize) -> bool) -> Result<()> {
+        if !self.folder.exists() {
+            return Ok(());
+        }
         let entries = std::fs::read_dir(&self.folder).map_err(|e| Error::io(&self.folder, e))?;
         for entry in entries {
             let path = entry.map_err(|e| Error::io(&self.folder, e))?.path();
-            if self.index(&path).is_some() && path.is_file() {
+            if self.index(&path).is_some_and(|index| !is_kept(index)) && path.is_file() {
                 std::fs::remove_file(&path).map_err(|e| Error::io(&path, e))?;
             }
         }

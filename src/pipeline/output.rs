@@ -4,6 +4,7 @@ use super::sink::TableTarget;
 use crate::error::{Error, Result};
 use crate::io::{FieldFormat, NumberedFiles};
 use crate::types::{SamplingGrid, choice_by_name, choices};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// A picture of one field, PNG.
@@ -77,6 +78,9 @@ pub struct OutputPlan {
     pub place: Place,
     /// Whether existing files may be replaced.
     pub replace: bool,
+    /// In a folder: the first frame whose results of an earlier run are removed when this one is complete;
+    /// `None`: none are.
+    pub stale_from: Option<usize>,
 }
 
 /// Where the files of fields lie.
@@ -255,6 +259,13 @@ impl OutputPlan {
             files.extend(self.pictures.iter().filter_map(|kind| self.picture_path(0, *kind)));
         }
         files
+    }
+
+    /// Removes what an earlier run left among `files`, numbered from `stale_from` on and not `written` by
+    /// this run.
+    pub(super) fn remove_stale(&self, files: &[NumberedFiles], written: &HashSet<usize>) -> Result<()> {
+        let Some(first) = self.stale_from else { return Ok(()) };
+        files.iter().try_for_each(|files| files.clear_except(|index| index < first || written.contains(&index)))
     }
 
     /// The file of the field of frame `index` in `format`.

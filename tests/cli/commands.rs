@@ -89,6 +89,41 @@ fn frames_are_numbered_as_in_the_input() {
 }
 
 #[test]
+fn a_shorter_run_leaves_nothing_of_a_longer_one() {
+    let place = Place::new();
+    place.good("synth affine -o five.npy --frames 5 --size 40x32");
+    place.good("synth affine -o three.npy --frames 3 --size 40x32");
+    for (command, five, three) in [
+        ("flow INPUT --picture colour -o out/", 6, vec!["000001.npz", "000001_colour.png"]),
+        ("filter INPUT --format flo -o filtered", 5, vec!["000000.flo", "000001.flo", "000002.flo"]),
+        ("stereo INPUT INPUT -o pairs", 5, (0..3).map(|_| "disparity_00000").collect()),
+    ] {
+        let folder = command.split(' ').next_back().unwrap();
+        place.good(&command.replace("INPUT", "five.npy"));
+        assert_eq!(place.names(folder).len(), five, "{command}");
+        fs::write(place.path(folder).join("000004_notes.png"), "mine").unwrap();
+        place.good(&format!("{} --force", command.replace("INPUT", "three.npy")));
+        let mut left = place.names(folder);
+        left.retain(|name| name != "000004_notes.png");
+        assert_eq!(left.len(), three.len(), "{left:?}");
+        assert!(left.iter().zip(&three).all(|(name, expected)| name.starts_with(expected)), "{left:?}");
+        assert!(place.path(folder).join("000004_notes.png").exists(), "{command}");
+    }
+    place.good("synth affine -o scene --frames 5 --size 40x32 --truth truth");
+    place.good("synth affine -o scene --frames 2 --size 40x32 --truth truth --force");
+    assert_eq!((place.names("scene").len(), place.names("truth").len()), (2, 2));
+    // A folder may be continued: what was found for frames before --start stays.
+    place.good("filter five.npy -o on --stop 2 --save-state state.npz");
+    place.good("filter five.npy -o on --start 2 --resume state.npz --force");
+    assert_eq!(place.names("on").len(), 5);
+    place.good("filter five.npy -o on --start 2 --stop 4 --resume state.npz --force");
+    assert_eq!(place.names("on"), ["000000.npz", "000001.npz", "000002.npz", "000003.npz"]);
+    // A run that fails removes nothing.
+    assert_ne!(place.line("flow five.npy -o on --start 1 --stop 2 --force").code, 0);
+    assert_eq!(place.names("on").len(), 4);
+}
+
+#[test]
 fn rpm_of_a_disc_is_measured_within_its_deviation() {
     let place = Place::new();
     place.good("synth disc -o disc.y4m --frames 8 --size 128x128 --rate 60 --set rpm=10 --set fps=60 --noise 1");

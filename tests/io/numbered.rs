@@ -26,3 +26,17 @@ fn clearing_removes_our_own_numbers_only() {
     assert!(kept.iter().all(|name| folder.path().join(name).exists()));
     assert!(!files.path(12).exists() && !files.path(1_000_000).exists() && files.path(99).is_dir());
 }
+
+#[test]
+fn names_without_a_stem_are_cleared_but_for_some_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = NumberedFiles::without_stem(folder.path(), "_curl.png");
+    let named = |index: usize| folder.path().join(format!("{index:06}_curl.png"));
+    assert_eq!((files.path(7), files.index(&named(7))), (named(7), Some(7)));
+    assert_eq!(files.clone().moved_to("elsewhere").index(&named(7)), None);
+    let other = folder.path().join("000007.png");
+    (3..6).map(named).chain([other.clone()]).for_each(|path| std::fs::write(path, "").unwrap());
+    files.clear_except(|index| index == 4).unwrap();
+    assert!(!named(3).exists() && named(4).exists() && !named(5).exists() && other.exists());
+    files.moved_to(folder.path().join("none")).clear().unwrap();
+}

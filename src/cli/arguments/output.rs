@@ -29,7 +29,8 @@ pub struct OutputArguments {
     /// 1/frame [default: from the first field]
     #[arg(long, value_name = "RATE", value_parser = parse_positive)]
     pub max_rate: Option<f64>,
-    /// Replace files that exist
+    /// Replace files that exist; when the run is complete, what an earlier run left in the folder for further
+    /// frames is removed, from the frame --start on
     #[arg(long)]
     pub force: bool,
 }

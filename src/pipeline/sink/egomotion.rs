@@ -11,6 +11,7 @@ use crate::motion3d::{
     contact_map, estimate_field_motion, focus_of_expansion,
 };
 use crate::types::{AnyFrame, FlowField};
+use std::collections::HashSet;
 use std::path::PathBuf;
 
 /// Columns of the table.
@@ -71,7 +72,15 @@ pub struct EgomotionPlan {
     pub pictures: Option<PathBuf>,
     /// A folder for times to contact all over the field, `contact_000000.npz`, ...
     pub maps: Option<PathBuf>,
+    /// The first frame whose pictures and maps of an earlier run are removed when this one is complete;
+    /// `None`: none are.
+    pub stale_from: Option<usize>,
 }
+
+/// Names of pictures begin so.
+const PICTURE_STEM: &str = "egomotion";
+/// Names of maps begin so.
+const MAP_STEM: &str = "contact";
 
 /// Writes, for each field, the rigid motion of the scene relative to the camera: direction `u` and rotation
 /// rate `w` (rad/frame) with their standard deviations, the focus of expansion (px), and the rate `nu u_z`
@@ -82,6 +91,8 @@ pub struct Egomotion {
     plan: EgomotionPlan,
     table: Table,
     alternatives: Option<Table>,
+    /// Frames with a map and a picture.
+    frames: HashSet<usize>,
     written: usize,
     latest: Option<PathBuf>,
 }
@@ -91,7 +102,7 @@ impl Egomotion {
     pub fn open(plan: EgomotionPlan) -> Result<Self> {
         let table = Table::create(&plan.target, &HEADER)?;
         let alternatives = plan.alternatives.as_ref().map(|target| Table::create(target, &ALTERNATIVES)).transpose()?;
-        Ok(Self { table, alternatives, plan, written: 0, latest: None })
+        Ok(Self { table, alternatives, plan, frames: HashSet::new(), written: 0, latest: None })
     }
 
     /// The motion of the scene outside of the region, where an independently moving object lies in the
@@ -156,18 +167,26 @@ impl Egomotion {
         let marks: Vec<ContactMark> = points.iter().enumerate().filter(|(k, _)| found.inliers[*k]).map(mark).collect();
         let focus = focus_of_expansion(&found.motion, &found.tangent, &found.covariance, Some(&self.plan.camera));
         draw_contacts(&mut picture, &marks, 0.5 * spacing, focus);
-        let path = NumberedFiles::create(folder, "egomotion", "png")?.path(step.field.layout.frame_index);
+        let path = NumberedFiles::create(folder, PICTURE_STEM, "png")?.path(step.field.layout.frame_index);
         write_picture(&path, &picture)?;
         self.written += 1;
         self.latest = Some(path);
         Ok(())
     }
 
+    /// Removes pictures and maps of frames from `first` on that this run did not write.
+    fn remove_stale(&self, first: usize) -> Result<()> {
+        let pictures = self.plan.pictures.iter().map(|folder| NumberedFiles::named(folder, PICTURE_STEM, "png"));
+        let maps = self.plan.maps.iter().map(|folder| NumberedFiles::named(folder, MAP_STEM, "npz"));
+        let is_kept = |index: usize| index < first || self.frames.contains(&index);
+        pictures.chain(maps).try_for_each(|files| files.clear_except(is_kept))
+    }
+
     /// Times to contact of all sites with their standard deviations and residuals.
     fn map<T: Real>(&mut self, field: &FlowField<T>, found: &MotionEstimate) -> Result<()> {
         let Some(folder) = &self.plan.maps else { return Ok(()) };
         let map = contact_map(field, &self.plan.camera, &found.uncertain(), self.plan.motion.placement)?;
-        let path = NumberedFiles::create(folder, "contact", "npz")?.path(field.layout.frame_index);
+        let path = NumberedFiles::create(folder, MAP_STEM, "npz")?.path(field.layout.frame_index);
         let mut archive = NpzWriter::create(&path)?;
         let planes =
             [("time_to_contact", map.contact), ("time_to_contact_std", map.deviation), ("residual", map.residual)];
@@ -207,13 +226,18 @@ impl<T: Real> Sink<Step<'_, T>> for Egomotion {
         if found.estimate.status == Status::TooFewPoints {
             return Ok(());
         }
+        self.frames.insert(frame);
         self.map(step.field, &found.estimate)?;
         self.draw(step, &found)
     }
 
     fn finish(&mut self, ending: Ending) -> Result<()> {
         let others = self.alternatives.as_mut().map_or(Ok(()), |table| table.finish(ending));
-        self.table.finish(ending).and(others)
+        self.table.finish(ending).and(others)?;
+        match (ending, self.plan.stale_from) {
+            (Ending::Complete, Some(first)) => self.remove_stale(first),
+            _ => Ok(()),
+        }
     }
 
     fn files(&self) -> (usize, Option<PathBuf>) {

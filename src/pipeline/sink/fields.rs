@@ -6,6 +6,7 @@ use crate::io::Element;
 use crate::math::Real;
 use crate::pipeline::output::{OutputPlan, Place, too_many};
 use crate::types::FlowField;
+use std::collections::HashSet;
 use std::path::PathBuf;
 
 /// Writes each field in the formats of a plan.
@@ -17,16 +18,18 @@ pub struct Fields<T> {
     options: String,
     waiting: Option<FlowField<T>>,
     written: usize,
+    frames: HashSet<usize>,
     latest: Option<PathBuf>,
 }
 
 impl<T: Real + Element> Fields<T> {
     /// A writer for the formats of `plan`; `options` says (in JSON) how the fields were made.
     pub fn new(plan: OutputPlan, options: String) -> Self {
-        Self { plan, options, waiting: None, written: 0, latest: None }
+        Self { plan, options, waiting: None, written: 0, frames: HashSet::new(), latest: None }
     }
 
     fn write(&mut self, field: &FlowField<T>) -> Result<()> {
+        self.frames.insert(field.layout.frame_index);
         for format in &self.plan.formats {
             if let Some(path) = self.plan.field_path(field.layout.frame_index, *format) {
                 format.write(&path, field, &self.options)?;
@@ -52,6 +55,7 @@ impl<T: Real + Element> Sink<Step<'_, T>> for Fields<T> {
     fn finish(&mut self, ending: Ending) -> Result<()> {
         match self.waiting.take() {
             Some(field) if ending == Ending::Complete => self.write(&field),
+            None if ending == Ending::Complete => self.plan.remove_stale(&self.plan.field_files(), &self.frames),
             _ => Ok(()),
         }
     }

@@ -8,6 +8,7 @@ use crate::io::write_picture;
 use crate::math::Real;
 use crate::pipeline::output::{OutputPlan, PictureKind, Place, too_many};
 use crate::types::{AnyFrame, FlowField, Frame, SamplingGrid};
+use std::collections::HashSet;
 use std::path::PathBuf;
 
 /// Pixels between arrows.
@@ -32,7 +33,7 @@ pub struct Pictures {
     ranges: PictureRanges,
     arrow_scale: Option<f64>,
     waiting: Vec<(PathBuf, Picture)>,
-    seen: usize,
+    frames: HashSet<usize>,
     written: usize,
     latest: Option<PathBuf>,
 }
@@ -40,7 +41,7 @@ pub struct Pictures {
 impl Pictures {
     /// Pictures as `plan` says.
     pub fn new(plan: OutputPlan, ranges: PictureRanges) -> Self {
-        Self { plan, ranges, arrow_scale: None, waiting: Vec::new(), seen: 0, written: 0, latest: None }
+        Self { plan, ranges, arrow_scale: None, waiting: Vec::new(), frames: HashSet::new(), written: 0, latest: None }
     }
 
     fn draw<T: Real>(&mut self, kind: PictureKind, field: &FlowField<T>, frame: &Frame<T>) -> Result<Picture> {
@@ -120,12 +121,12 @@ fn stride<T>(field: &FlowField<T>) -> usize {
 
 impl<T: Real> Sink<Step<'_, T>> for Pictures {
     fn accept(&mut self, step: &Step<'_, T>) -> Result<()> {
-        self.seen += 1;
+        self.frames.insert(step.field.layout.frame_index);
         for kind in self.plan.pictures.clone() {
             let picture = self.draw(kind, step.field, step.frame)?;
             let Some(path) = self.plan.picture_path(step.field.layout.frame_index, kind) else { continue };
             match &self.plan.place {
-                Place::Single(_) if self.seen > 1 => return Err(too_many(&path, "several")),
+                Place::Single(_) if self.frames.len() > 1 => return Err(too_many(&path, "several")),
                 Place::Single(_) => self.waiting.push((path, picture)),
                 _ => self.write(path, &picture)?,
             }
@@ -139,7 +140,10 @@ impl<T: Real> Sink<Step<'_, T>> for Pictures {
                 self.write(path, &picture)?;
             }
         }
-        Ok(())
+        match ending {
+            Ending::Complete => self.plan.remove_stale(&self.plan.picture_files(), &self.frames),
+            Ending::Partial => Ok(()),
+        }
     }
 
     fn files(&self) -> (usize, Option<PathBuf>) {
