@@ -8,6 +8,9 @@ use rayon::prelude::*;
 /// Samples of a parallel task.
 const PART: usize = 1 << 16;
 
+/// Numbers from here on have no fraction.
+const MAX_FRACTIONAL: f64 = (1u64 << 52) as f64;
+
 /// Rounds samples down to a multiple of a step: `floor(x / step) * step`.
 ///
 /// Step 1, the default, turns a computed brightness into the integer that a camera would report, as in
@@ -42,7 +45,11 @@ impl Quantiser {
         if step == 1.0 {
             return frame.map(|x| T::from_f64(x.to_f64().floor()));
         }
-        frame.map(|x| T::from_f64((x.to_f64() / step).floor() * step))
+        let quantised = |x: f64| {
+            let steps = x / step;
+            if steps.abs() < MAX_FRACTIONAL { steps.floor() * step } else { x }
+        };
+        frame.map(|x| T::from_f64(quantised(x.to_f64())))
     }
 }
 

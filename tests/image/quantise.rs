@@ -11,6 +11,8 @@ fn values_go_down_to_the_level_below() {
     assert!(out.data()[3].is_nan());
     let coarse = Quantiser::new(0.5).unwrap().apply(&frame);
     assert_eq!(&coarse.data()[..3], &[1.5, -0.5, 3.0]);
+    // More levels than a number counts: each value is one.
+    assert_eq!(&Quantiser::new(1e-310).unwrap().apply(&frame).data()[..3], &frame.data()[..3]);
 }
 
 #[test]

@@ -269,6 +269,12 @@ def test_options_are_named_as_the_user_wrote_them():
         field.region_mean("curl", (0, 0, 600, 5))
 
 
+@pytest.mark.parametrize("n", [2**40, 2**62])
+def test_selections_beyond_memory_are_refused(n):
+    with pytest.raises(MemoryError, match="^n: "):
+        jacoflow.filters.resample([0.5, 0.5], n)
+
+
 def test_frames_beyond_memory_are_refused():
     scene = jacoflow.scenes.Scene("affine", width=64, height=48)
     for count in (10**12, 10**30):

@@ -74,7 +74,8 @@ fn read_points(path: &Path, into: &mut Vec<(usize, usize)>) -> Result<()> {
     let text = std::fs::read_to_string(path).map_err(|source| Error::io(path, source))?;
     let mut columns = (0, 1);
     let before = into.len();
-    for (number, line) in text.lines().enumerate() {
+    // Spreadsheets begin text with a byte order mark.
+    for (number, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
         let cells: Vec<&str> = line.split(',').map(str::trim).collect();
         if line.trim().is_empty() {
             continue;
@@ -115,6 +116,8 @@ mod tests {
             points: vec!["7,8".into(), file.to_string_lossy().into()],
             mask: None,
         };
+        assert_eq!(arguments.sampling_grid().unwrap(), SamplingGrid::Points(vec![(7, 8), (1, 2), (3, 4)]));
+        std::fs::write(&file, "\u{feff}x,y\r\n1,2\r\n3,4\r\n").unwrap();
         assert_eq!(arguments.sampling_grid().unwrap(), SamplingGrid::Points(vec![(7, 8), (1, 2), (3, 4)]));
         std::fs::write(&file, "1,2\n3,-4\n").unwrap();
         assert!(arguments.sampling_grid().unwrap_err().to_string().contains("line 2"));

@@ -33,7 +33,8 @@ fn listed(list: &Path) -> Result<Vec<PathBuf>> {
             ErrorKind::InvalidData => Error::format(list, "not a list of files: it is not text"),
             _ => Error::io(list, e),
         })?;
-        let line = line.trim();
+        // Editors of Windows begin text with a byte order mark.
+        let line = line.trim_start_matches('\u{feff}').trim();
         if !line.is_empty() && !line.starts_with('#') {
             paths.push(folder.join(line));
         }
@@ -52,7 +53,7 @@ mod tests {
     fn lines_are_paths_relative_to_the_list() {
         let folder = tempfile::tempdir().unwrap();
         let list = folder.path().join("frames.txt");
-        std::fs::write(&list, "# frames\nb.png\r\n\n  a b.png \n/abs/c.png\n").unwrap();
+        std::fs::write(&list, "\u{feff}# frames\nb.png\r\n\n  a b.png \n/abs/c.png\n").unwrap();
         let want: Vec<_> = ["b.png", "a b.png", "/abs/c.png"].iter().map(|n| folder.path().join(n)).collect();
         assert_eq!(listed(&list).unwrap(), want);
         std::fs::write(&list, "\n# nothing\n").unwrap();

@@ -2,7 +2,7 @@
 
 use crate::errors::Outcome;
 use crate::{arrays, image::renamed, options::Integer, options::count, options::named};
-use jacoflow::error::{Error, shape_text};
+use jacoflow::error::{Error, check_memory, shape_text};
 use jacoflow::filter::particle::{Resampling, resample_indices};
 use jacoflow::math::random::CounterRng;
 use pyo3::prelude::*;
@@ -30,6 +30,7 @@ pub fn resample<'py>(
     let scheme = Resampling::parse(scheme).map_err(|error| renamed(error, "resampling", "scheme"))?;
     let weights = checked_weights(weights)?;
     let number = n.map(|n| count("n", n)).transpose()?.unwrap_or(weights.len());
+    check_memory("n", number.checked_mul(size_of::<usize>() + size_of::<i64>()))?;
     let mut indices = Vec::new();
     if let Some(uniforms) = uniforms {
         if random_state.is_some() {
