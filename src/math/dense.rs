@@ -215,7 +215,7 @@ fn negative_eigenvalue(a: &[f64], n: usize) -> Option<f64> {
 /// Replaces a square matrix `a` by the lower triangular `l` with `l l^T = a a^T` and a diagonal that is not
 /// negative (A. S. Householder's reflections, from the right).
 ///
-/// Each row's error is rounding of that row's length, whatever cancels in `a a^T`.
+/// Each row's error is rounding of that row's length, also where terms of `a a^T` cancel.
 pub fn lower_triangle(a: &mut [f64], n: usize) {
     for j in 0..n {
         let (row, below) = a[j * n..].split_at_mut(n);
