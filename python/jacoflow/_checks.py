@@ -59,7 +59,16 @@ def numbers(name: str, value: Any, expected: str, shape: tuple[int | None, ...] 
         raise ValueError(f"{name}: expected {expected}, got {shown(value)}")
     if shape is not None and (array.ndim != len(shape) or any(length not in (None, got) for length, got in zip(shape, array.shape, strict=True))):
         raise ValueError(f"{name}: expected {expected}, got shape {array.shape}")
+    check_memory(name, 8 * array.size)
     return array.astype(np.float64, copy=False)
+
+
+def check_memory(name: str, size: int) -> None:
+    """MemoryError by name for more bytes than can be had: a view of one number may have any shape."""
+    try:
+        np.empty(size, np.uint8)
+    except (MemoryError, ValueError):
+        raise MemoryError(f"{name}: expected what fits into memory, got {size} bytes") from None
 
 
 def converted(name: str, value: Any, convert: Callable[[Any], Any], expected: str) -> Any:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, ClassVar, Literal, TypeAlias, final, overload
+from typing import Any, ClassVar, Literal, Never, TypeAlias, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -455,7 +455,7 @@ class Measurement:
         """Centre (x, y) of the region's sites, or the pixel `at`, float64 array (2,) or (T, 2), px."""
 def estimate(
     frames: _Frames,
-    *more: Any,
+    *more: Never,
     ends: Literal["nan", "drop"] = "nan",
     pairs: bool = False,
     method: FlowMethod | None = None,
@@ -551,9 +551,9 @@ def estimate(
 
 def flow(
     first: _Frame,
-    second: _Frame | None = None,
+    second: _Frame,
     third: _Frame | None = None,
-    *more: Any,
+    *more: Never,
     method: FlowMethod | None = None,
     initial: FlowField | ArrayLike | None = None,
     temporal: Fusion | None = None,
@@ -646,7 +646,8 @@ class FlowFilter:
     Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y) in 8-bit grey levels, px and frames. `profile` "patent"
     has the patent's constants, "measured" those for raw 8-bit frames (9 x 9 pixels); a `FilterProfile`
     replaces single ones. The noise adapts to frames that are not locally quadratic. The other options are
-    those of `estimate`. Pickles in mid-stream.
+    those of `estimate`, but for the default of `precision`: float64 also where `R` is below 0.25, as in both
+    profiles. Pickles in mid-stream.
     """
     def __new__(
         cls,
@@ -1357,9 +1358,14 @@ class Scene:
     def frame(self, /, t: float) -> NDArray[np.float64]:
         """The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded
         nor clipped.
+
+        ValueError for a time that is not finite, or beyond the paths that the scene follows: 1e5 steps, which
+        are 25000 frames or fewer in the scenes whose paths are integrated.
         """
     def frames(self, /, count: int, start: float = 0.0) -> NDArray[np.float64]:
-        """Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit scale."""
+        """Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit scale.
+        ValueError for times that `frame` refuses.
+        """
     def truth(self, /, t: float, *, between: tuple[float, float] | None = None) -> FlowField:
         """Exact flow and Jacobian of the frame of time `t` (frames), a FlowField (H, W) in px/frame and 1/frame.
 
@@ -1367,17 +1373,19 @@ class Scene:
         the times t + a and t + b of the matter that is at each pixel at time t, `(d(b) - d(a)) / (b - a)` for
         displacements d since t: what frames can show, where paths are curved. (0, 1) is the displacement to
         the next frame, (-1, 1) the mean of those since the last and to the next. Status MASKED and NaN where
-        the scene has no single truth.
+        the scene has no single truth. ValueError for times that are not finite, equal times and those that
+        `displacement` refuses.
         """
     def motion(self, /, x: float, y: float, t: float) -> NDArray[np.float64] | None:
         """Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame,
-        array (6,); None without truth.
+        array (6,); None without truth. ValueError for a number that is not finite.
         """
     def displacement(self, /, x: float, y: float, t: float, duration: float = 1.0) -> tuple[float, float] | None:
         """How far (x, y) px the matter at scene point (x, y) px and time t has gone `duration` frames later;
         None where the scene does not know.
 
-        It differs from `duration` times the velocity wherever paths are curved.
+        It differs from `duration` times the velocity wherever paths are curved. ValueError for a number that
+        is not finite, and for a duration longer than the scene follows paths, as in `frame`.
         """
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self, /) -> int: ...

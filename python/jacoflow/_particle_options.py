@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._checks import numbers, real_number
+from ._checks import check_memory, numbers, real_number
 
 MOST_ID = 2**63 - 2
 """Greatest number of a target, no unit."""
@@ -17,6 +17,8 @@ MOST = {"random_state": 2**64 - 1, "threads": 2**31 - 1}
 """Greatest values, no unit, of integers that are not counts of particles."""
 MOST_PARTICLES = 10**8
 """Most particles of a target, no unit: more would take all memory."""
+BOX_BYTES = 256
+"""Memory of a target's number and box as objects of Python, bytes."""
 WORDS = {
     "mode": '"improved" or "paper"',
     "resampling": '"multinomial", "stratified", "systematic" or "residual"',
@@ -119,6 +121,7 @@ def checked_boxes(value: Any) -> list[tuple[int, list[float]]]:
     if empty:
         return []
     array = numbers("boxes", value, "an array (K, 4) of left, top, width, height, px, or a dict id -> box", (None, 4))
+    check_memory("boxes", BOX_BYTES * len(array))
     return [(number, box.tolist()) for number, box in enumerate(array)]
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ._checks import numbers, positive_integer, positive_number
+from ._checks import check_memory, numbers, positive_integer, positive_number
 from ._figures import axes_or_new, check_parts, colour_map, expect_colour, frame_extent, pyplot_or_error
 from ._jacoflow import FlowField
 from ._stereo_plot import clusters, disparity, track_graph
@@ -70,6 +70,7 @@ def wheel_image(size: int = 96) -> NDArray[np.uint8]:
     """The key to `flow_image`, uint8 array (size, size, 3), size in px: the colour at an offset from the
     middle is that of flow in that direction."""
     size = positive_integer("size", size)
+    check_memory("size", 24 * size**2)
     offsets = (np.arange(size) - (size - 1) / 2) / (size / 2)
     v, u = np.meshgrid(offsets, offsets, indexing="ij")
     image = _colours(u, v, 1.0)
@@ -160,7 +161,10 @@ def scalar_map(
     for the title and the bar.
     """
     given = np.asarray(values)
-    values = numbers("values", given.astype(float) if given.dtype == bool else given, "an array (H, W)", (None, None))
+    given = given.view(np.uint8) if given.dtype == bool else given
+    values = numbers("values", given, "an array (H, W)", (None, None))
+    # The plane and its absolute values.
+    check_memory("values", 2 * values.nbytes)
     axes = axes_or_new(axes)
     finite = np.abs(values[np.isfinite(values)])
     if limit is None:

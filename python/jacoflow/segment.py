@@ -19,6 +19,7 @@ import operator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._checks import check_memory
 from ._jacoflow import _felzenszwalb, _region_means
 
 __all__ = ["felzenszwalb", "region_means"]
@@ -63,8 +64,8 @@ def felzenszwalb(
     labels : array (H, W) of int32
         Region of every pixel, 0 to n - 1, numbered in the order of their first pixels, row by row.
 
-    ValueError names an argument that is negative, not finite or empty, or the shape; TypeError the type of
-    the samples.
+    ValueError names an argument that is negative, not finite or empty (an image without a finite pixel too),
+    or the shape; TypeError the type of the samples.
     """
     try:
         smallest = operator.index(min_size)
@@ -90,16 +91,18 @@ def region_means(labels: ArrayLike, values: ArrayLike) -> NDArray[np.float64]:
         `means[labels]` is the map of the means.
 
     ValueError for shapes that do not fit or labels below 0 or above 2^27; TypeError unless the labels are
-    integers.
+    integers; MemoryError for labels whose sums (16 bytes for each number from 0 to the largest, and channel)
+    do not fit into memory.
     """
     regions = np.asarray(labels)
     if regions.dtype.kind not in "iu":
         raise TypeError(f"labels: expected integers, got {regions.dtype}")
     if regions.ndim != 2:
         raise ValueError(f"labels: expected shape (H, W), got {regions.shape}")
+    check_memory("labels", 8 * regions.size)
     if regions.size and regions.dtype.kind == "u" and int(regions.max()) > np.iinfo(np.int64).max:
         raise ValueError(f"labels: expected 0 to {1 << 27}, got {regions.max()}")
     numbers = np.asarray(values)
     if numbers.dtype.kind == "b":
-        numbers = numbers.astype(np.float64)
+        numbers = numbers.view(np.uint8)
     return _region_means(np.ascontiguousarray(regions, np.int64), numbers)

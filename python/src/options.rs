@@ -9,7 +9,7 @@ use jacoflow::parallel::Threads;
 use jacoflow::simd::Level;
 use jacoflow::types::{Mask, Precision, Rect, Sample, SamplingGrid, Units};
 use pyo3::conversion::FromPyObjectOwned;
-use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyOverflowError, PyTypeError, PyUnicodeEncodeError, PyValueError};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 
@@ -51,13 +51,13 @@ arguments!(
     u32: "an integer from 0 to 2^32 - 1",
     i32: "an integer from -2^31 to 2^31 - 1",
     f64: "a number up to 1.8e308",
-    (f64, f64): "numbers up to 1.8e308",
+    (f64, f64): "two numbers up to 1.8e308",
     Integer: "an integer",
     bool: "True or False",
     &str: "a string",
     String: "a string",
     PathBuf: "a path (a string or os.PathLike)",
-    Region: "four integers (x, y, width, height)",
+    Region: "four integers (x, y, width, height) of 64 bits",
     Py<PyAny>: "an object",
 );
 
@@ -75,9 +75,13 @@ fn argument<'a, 'py, T: Argument + FromPyObject<'a, 'py>>(name: &str, value: &'a
     value.extract::<T>().map_err(|error| {
         let error: PyErr = error.into();
         if error.is_instance_of::<PyOverflowError>(value.py()) {
-            let words = value.str().map_or_else(|_| "a larger one".into(), |text| text.to_string());
-            let got: String = words.chars().take(MAX_DIGITS).collect();
-            return PyValueError::new_err(format!("{name}: expected {}, got {got}", T::EXPECTED));
+            return PyValueError::new_err(format!("{name}: expected {}, got {}", T::EXPECTED, shown(value)));
+        }
+        if error.is_instance_of::<PyUnicodeEncodeError>(value.py()) {
+            return PyValueError::new_err(format!("{name}: expected valid Unicode text, got {}", shown(value)));
+        }
+        if error.is_instance_of::<PyValueError>(value.py()) {
+            return PyValueError::new_err(format!("{name}: expected {}, got {}", T::EXPECTED, shown(value)));
         }
         if error.is_instance_of::<PyTypeError>(value.py()) {
             return PyTypeError::new_err(format!("{name}: expected {}, got {}", T::EXPECTED, arrays::kind_of(value)));
@@ -86,8 +90,14 @@ fn argument<'a, 'py, T: Argument + FromPyObject<'a, 'py>>(name: &str, value: &'a
     })
 }
 
-/// Digits of a number in a message.
-const MAX_DIGITS: usize = 40;
+/// Characters of a value in a message.
+const MAX_SHOWN: usize = 40;
+
+/// The beginning of a value's text.
+fn shown(value: &Bound<'_, PyAny>) -> String {
+    let words = value.repr().map_or_else(|_| "another value".into(), |text| text.to_string());
+    words.chars().take(MAX_SHOWN).collect()
+}
 
 /// Arguments by their names, for `from_py_with`.
 pub mod named {
@@ -112,13 +122,14 @@ impl<'py> FromPyObject<'_, 'py> for Region {
     type Error = PyErr;
 
     fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        let wrong = || PyTypeError::new_err("region: expected four integers (x, y, width, height)");
+        let wrong = || PyTypeError::new_err(Self::EXPECTED);
         // No more than are needed: there may be very many.
         let items = object.try_iter().and_then(|items| items.take(5).collect());
         let items: Vec<Bound<'_, PyAny>> = items.map_err(|_| wrong())?;
-        let numbers: Vec<Integer> =
-            items.iter().map(PyAnyMethods::extract).collect::<PyResult<_>>().map_err(|_| wrong())?;
-        let [Integer(x), Integer(y), Integer(width), Integer(height)] = numbers[..] else { return Err(wrong()) };
+        let is_overflow = |error: &PyErr| error.is_instance_of::<PyOverflowError>(object.py());
+        let numbers: PyResult<Vec<i64>> = items.iter().map(PyAnyMethods::extract).collect();
+        let numbers = numbers.map_err(|error| if is_overflow(&error) { error } else { wrong() })?;
+        let [x, y, width, height] = numbers[..] else { return Err(wrong()) };
         Ok(Self((x, y, width, height)))
     }
 }

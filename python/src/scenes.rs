@@ -9,7 +9,9 @@ use crate::keywords::getters;
 use jacoflow::error::Error;
 use jacoflow::parallel::Threads;
 use jacoflow::synth::registry::{CARRIERS, Parameter, SCENES};
-use jacoflow::synth::{Rounding, Scene as CoreScene, SceneOptions, Sensor as CoreSensor, build, mean_truth, truth};
+use jacoflow::synth::{
+    Rounding, Scene as CoreScene, SceneOptions, Sensor as CoreSensor, build, check_time, mean_truth, truth,
+};
 use pyo3::exceptions::{PyMemoryError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{IntoPyDict, PyDict, PyTuple};
@@ -93,7 +95,11 @@ impl Scene {
 
     /// The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded
     /// nor clipped.
+    ///
+    /// ValueError for a time that is not finite, or beyond the paths that the scene follows: 1e5 steps, which
+    /// are 25000 frames or fewer in the scenes whose paths are integrated.
     fn frame<'py>(&self, py: Python<'py>, #[pyo3(from_py_with = named::t)] t: f64) -> Outcome<Bound<'py, PyAny>> {
+        check_time(self.core.as_ref(), "t", t)?;
         self.expect_room(1)?;
         let threads = Threads::new(None)?;
         let frame = interruptible(py, || Ok(threads.install(|| self.core.frame(t))))?;
@@ -101,6 +107,7 @@ impl Scene {
     }
 
     /// Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit scale.
+    /// ValueError for times that `frame` refuses.
     #[pyo3(signature = (count, start=0.0))]
     fn frames<'py>(
         &self,
@@ -110,6 +117,8 @@ impl Scene {
     ) -> Outcome<Bound<'py, PyAny>> {
         let wrong = |_| Error::argument("count", "zero or a positive integer", count.0);
         let count = usize::try_from(count.0).map_err(wrong)?;
+        check_time(self.core.as_ref(), "start", start)?;
+        check_time(self.core.as_ref(), "count", start + count.saturating_sub(1) as f64)?;
         let (width, height) = self.core.size();
         let threads = Threads::new(None)?;
         let mut data = self.expect_room(count)?;
@@ -127,7 +136,8 @@ impl Scene {
     /// the times t + a and t + b of the matter that is at each pixel at time t, `(d(b) - d(a)) / (b - a)` for
     /// displacements d since t: what frames can show, where paths are curved. (0, 1) is the displacement to
     /// the next frame, (-1, 1) the mean of those since the last and to the next. Status MASKED and NaN where
-    /// the scene has no single truth.
+    /// the scene has no single truth. ValueError for times that are not finite, equal times and those that
+    /// `displacement` refuses.
     #[pyo3(signature = (t, *, between=None))]
     fn truth(
         &self,
@@ -147,7 +157,7 @@ impl Scene {
     }
 
     /// Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame,
-    /// array (6,); None without truth.
+    /// array (6,); None without truth. ValueError for a number that is not finite.
     fn motion<'py>(
         &self,
         py: Python<'py>,
@@ -155,6 +165,7 @@ impl Scene {
         #[pyo3(from_py_with = named::y)] y: f64,
         #[pyo3(from_py_with = named::t)] t: f64,
     ) -> Outcome<Option<Bound<'py, PyAny>>> {
+        check_finite([("x", x), ("y", y), ("t", t)])?;
         let motion = self.core.motion(x, y, t);
         motion.map(|m| arrays::owned(py, &[6], m.to_array().to_vec())).transpose()
     }
@@ -162,7 +173,8 @@ impl Scene {
     /// How far (x, y) px the matter at scene point (x, y) px and time t has gone `duration` frames later;
     /// None where the scene does not know.
     ///
-    /// It differs from `duration` times the velocity wherever paths are curved.
+    /// It differs from `duration` times the velocity wherever paths are curved. ValueError for a number that
+    /// is not finite, and for a duration longer than the scene follows paths, as in `frame`.
     #[pyo3(signature = (x, y, t, duration=1.0))]
     fn displacement(
         &self,
@@ -170,8 +182,10 @@ impl Scene {
         #[pyo3(from_py_with = named::y)] y: f64,
         #[pyo3(from_py_with = named::t)] t: f64,
         #[pyo3(from_py_with = named::duration)] duration: f64,
-    ) -> Option<(f64, f64)> {
-        self.core.displacement(x, y, t, duration)
+    ) -> Outcome<Option<(f64, f64)>> {
+        check_finite([("x", x), ("y", y), ("t", t)])?;
+        check_time(self.core.as_ref(), "duration", duration)?;
+        Ok(self.core.displacement(x, y, t, duration))
     }
 
     /// The same name and options, so the same pictures.
@@ -306,6 +320,14 @@ impl Sensor {
             Rounding::Floor => "floor",
             Rounding::Nearest => "nearest",
         }
+    }
+}
+
+/// Refuses a coordinate or a time that is not finite.
+fn check_finite(numbers: [(&'static str, f64); 3]) -> Outcome<()> {
+    match numbers.into_iter().find(|(_, number)| !number.is_finite()) {
+        Some((name, number)) => Err(Error::argument(name, "a finite number", number).into()),
+        None => Ok(()),
     }
 }
 

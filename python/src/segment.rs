@@ -68,6 +68,10 @@ pub fn segment_felzenszwalb<'py>(
     macro_rules! of {
         ($($sample:ty),*) => {$(
             if let Some(samples) = arrays::elements::<$sample>(&array) {
+                let is_finite = |pixel: &[$sample]| pixel.iter().all(|&sample| f64::from(sample).is_finite());
+                if !samples.is_empty() && !samples.chunks_exact(channels).any(is_finite) {
+                    return Err(Error::argument("image", "at least one finite pixel", "none").into());
+                }
                 let image = Interleaved { size, channels, samples: &samples };
                 return wrap(py, size, interruptible(py, || labels(&image, &options, threads))?);
             }

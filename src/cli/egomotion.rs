@@ -96,7 +96,7 @@ impl EgomotionCommand {
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         // Numbers are no file, or one that does not exist.
         let files = self.grid.files().chain(self.method.initial.as_deref()).chain([Path::new(&self.intrinsics)]);
-        CommandPaths::of_input(&self.input.input)
+        let _new_folders = CommandPaths::of_input(&self.input.input)
             .reading(files)
             .writing("output", self.output.as_deref())
             .writing("alternatives", self.alternatives.as_deref())

@@ -6,16 +6,16 @@ use super::arguments::{
 };
 use super::flow::{expect_output, plan_output, with_output};
 use super::interrupt::Watch;
-use super::open::{Opened, compute, in_double, open_input, preprocess, read_mask};
+use super::open::{Opened, compute, open_input, preprocess, read_mask};
 use super::paths::{CommandPaths, is_same_file};
 use super::report::{Report, print_message};
 use super::run::{ReportContext, input_details, report, run_pipeline};
 use crate::error::{Error, Result};
 use crate::image::Preprocess;
-use crate::io::Element;
+use crate::io::{Element, npz::NpzReader};
 use crate::pipeline::{FilterStage, OutputPlan, Pipeline, check_target, is_folder};
 use crate::simd::SimdReal;
-use crate::temporal::{FlowFilter, FlowFilterOptions};
+use crate::temporal::{FlowFilter, FlowFilterOptions, SavedFilter};
 use crate::types::Precision;
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -59,18 +59,18 @@ impl FilterCommand {
         if let (Some(_), Some(name)) = (&self.resume, self.filter.given()) {
             return Err(Error::argument(name, "no such option with --resume, whose state has its own", "one"));
         }
-        self.paths()?.check(self.output.force)?;
+        let _new_folders = self.paths()?.check(self.output.force)?;
         let mut opened = open_input(&self.input)?;
         let options = self.options(&mut opened)?;
         let steps = preprocess(&self.input, options.mask.as_ref())?;
         if let Some(path) = self.save_state.as_ref().filter(|path| !self.is_in_new_folder(path)) {
-            check_target(path, self.output.force || self.is_resumed(path))?;
+            check_target(path, self.output.force || self.is_resumed(path))
+                .map_err(|error| error.about("save_state"))?;
         }
         if let Some(path) = &self.resume {
             return self.resume(path, opened, &options, steps, watch);
         }
-        // Small measurement noise is beyond single precision; see `FlowFilter`.
-        if in_double(self.compute.precision, &opened.first, options.measurement_noise < 0.25) {
+        if options.is_double(self.compute.precision, opened.first.dtype) {
             self.run(opened, FilterStage::<f64>::new(options, steps), watch)
         } else {
             self.run(opened, FilterStage::<f32>::new(options, steps), watch)
@@ -110,13 +110,12 @@ impl FilterCommand {
             return Err(Error::argument("precision", "auto with --resume, whose state has its own", "another"));
         }
         let (threads, simd) = (options.threads, options.simd);
-        match FlowFilter::<f64>::load(path) {
-            Ok(filter) => self.run(opened, FilterStage::resume(filter.with_computation(threads, simd), steps), watch),
-            Err(Error::Format { .. }) => {
-                let filter = FlowFilter::<f32>::load(path)?;
-                self.run(opened, FilterStage::resume(filter.with_computation(threads, simd), steps), watch)
-            }
-            Err(error) => Err(error),
+        if SavedFilter::is_double(&mut NpzReader::open(path)?)? {
+            let filter = FlowFilter::<f64>::load(path)?.with_computation(threads, simd);
+            self.run(opened, FilterStage::resume(filter, steps), watch)
+        } else {
+            let filter = FlowFilter::<f32>::load(path)?.with_computation(threads, simd);
+            self.run(opened, FilterStage::resume(filter, steps), watch)
         }
     }
 

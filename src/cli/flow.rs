@@ -4,7 +4,7 @@ use super::arguments::{
     ComputeArguments, GridArguments, InputArguments, MessageArguments, MethodArguments, OutputArguments,
 };
 use super::interrupt::Watch;
-use super::open::{Opened, compute, in_double, open_input, preprocess, read_initial, read_mask};
+use super::open::{Opened, compute, open_input, preprocess, read_initial, read_mask};
 use super::paths::CommandPaths;
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow};
@@ -91,7 +91,7 @@ pub fn prepare(
             return Err(Error::argument("frames", "an even number, in pairs", odd));
         }
     }
-    Ok(Prepared { plan, is_double: in_double(compute_arguments.precision, &opened.first, false), description })
+    Ok(Prepared { plan, is_double: compute_arguments.precision.is_double(opened.first.dtype), description })
 }
 
 /// As [`prepare`], with the covariance that `purpose` needs.
@@ -119,7 +119,9 @@ pub fn with_output(paths: CommandPaths, output: &OutputArguments, points: bool) 
     let Some(given) = output.output.as_deref() else { return Ok(paths) };
     let plan = decide_output(output, points, false, true, None)?;
     let numbered = plan.field_files().into_iter().chain(plan.picture_files());
-    Ok(paths.writing_files("output", given, plan.single_files(), numbered))
+    // The table of a folder, which another run writes without a format for points.
+    let table = Some(given.join("points.csv")).filter(|_| is_folder(given) && output.format.is_empty());
+    Ok(paths.writing_files("output", given, plan.single_files().into_iter().chain(table), numbered))
 }
 
 /// Where results go: the user's words, or CSV on standard output for points without any. With --force,
@@ -178,7 +180,8 @@ impl FlowCommand {
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let files = self.grid.files().chain(self.method.initial.as_deref());
         let paths = CommandPaths::of_input(&self.input.input).reading(files);
-        with_output(paths, &self.output, !self.grid.points.is_empty())?.check(self.output.force)?;
+        let paths = with_output(paths, &self.output, !self.grid.points.is_empty())?;
+        let _new_folders = paths.check(self.output.force)?;
         let mut opened = open_input(&self.input)?;
         let Prepared { plan: stream, is_double, description } =
             prepare(&mut opened, &self.input, &self.method, &self.grid, &self.compute)?;

@@ -68,7 +68,7 @@ impl MeasureCommand {
             self.quantity.iter().map(|name| Measured::parse(&name.replace('-', "_"))).collect::<Result<_>>()?;
         let files = self.grid.files().chain(self.method.initial.as_deref());
         let paths = CommandPaths::of_input(&self.input.input).reading(files);
-        paths.writing("output", self.output.as_deref()).check(self.force)?;
+        let _new_folders = paths.writing("output", self.output.as_deref()).check(self.force)?;
         let target = table_target(self.output.as_deref(), self.force, self.messages.json)?;
         let mut opened = open_input(&self.input)?;
         if let Some(quantity) = quantities.iter().find(|q| q.needs_fps() && opened.numbering.rate.is_none()) {

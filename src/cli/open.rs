@@ -11,7 +11,7 @@ use crate::io::{
 use crate::parallel::Threads;
 use crate::pipeline::{FirstFrame, Numbering, peek};
 use crate::simd::Level;
-use crate::types::{AnyColourFrame, AnyFrame, Frame, Mask, Precision, Units};
+use crate::types::{AnyColourFrame, AnyFrame, Frame, Mask, Units};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -112,11 +112,6 @@ pub fn compute(arguments: &ComputeArguments) -> Result<(Threads, Option<Level>)>
         Threads::new(arguments.threads.threads)?,
         Level::check(arguments.simd.as_deref().map(Level::parse).transpose()?)?,
     ))
-}
-
-/// Whether to compute in double precision for frames of this type: by default if `demanding`.
-pub fn in_double(precision: Precision, first: &FirstFrame, demanding: bool) -> bool {
-    (demanding && precision == Precision::Auto) || precision.is_double(first.dtype)
 }
 
 /// The flow that an estimate starts from: KITTI's format for .png, else .flo.

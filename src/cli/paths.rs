@@ -90,10 +90,11 @@ impl CommandPaths {
     }
 
     /// Checks that nothing read is written, which not even `force` is meant for, and nothing written twice.
+    /// Returns the folders that the command may make.
     ///
     /// # Errors
     /// [`Error::Argument`] naming the option that writes.
-    pub fn check(&self, force: bool) -> Result<()> {
+    pub fn check(&self, force: bool) -> Result<NewFolders> {
         for (number, written) in self.written.iter().enumerate() {
             let is_input = self.read.contains(&written.place);
             if is_input || force && self.around_input.contains(&written.place) {
@@ -108,7 +109,25 @@ impl CommandPaths {
                 }
             }
         }
-        Ok(())
+        let places = self.written.iter().flat_map(|written| written.place.ancestors());
+        let mut new: Vec<PathBuf> = places.filter(|place| !place.exists()).map(Path::to_path_buf).collect();
+        new.sort_by_key(|path| std::cmp::Reverse(path.components().count()));
+        Ok(NewFolders(new))
+    }
+}
+
+/// Paths that did not exist before a command, the innermost first. Those that are empty folders at its end
+/// are removed, so that a refused command leaves none.
+#[must_use = "the folders are removed when this is dropped"]
+#[derive(Debug)]
+pub struct NewFolders(Vec<PathBuf>);
+
+impl Drop for NewFolders {
+    fn drop(&mut self) {
+        for path in &self.0 {
+            // Fails for files and for folders that hold something, which stay.
+            let _ = std::fs::remove_dir(path);
+        }
     }
 }
 

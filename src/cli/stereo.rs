@@ -98,7 +98,7 @@ impl StereoCommand {
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let options = self.options()?;
         let formats = self.formats()?;
-        self.paths(&formats).check(self.force)?;
+        let _new_folders = self.paths(&formats).check(self.force)?;
         self.check_output(&formats)?;
         let (views, numbering) = self.layout.open(&self.input, &self.selection, None)?;
         let mut pairs = GreyPairs::start(views, Preprocess::default(), options.threads)?;
@@ -185,14 +185,15 @@ impl StereoCommand {
 
     /// Refuses what could only fail after work has been done.
     fn check_output(&self, formats: &[DisparityFormat]) -> Result<()> {
-        for path in self.output.iter().chain(&self.picture) {
+        for (option, path) in [("output", &self.output), ("picture", &self.picture)] {
+            let Some(path) = path else { continue };
             if path.exists() && is_folder(path) && !path.is_dir() {
-                return Err(Error::argument("output", "a folder", path.display()));
+                return Err(Error::argument(option, "a folder", path.display()));
             }
             let occupied = path.read_dir().is_ok_and(|mut entries| entries.next().is_some());
             if is_folder(path) && occupied && !self.force {
                 let wanted = "an empty or new folder (--force writes into it)";
-                return Err(Error::argument("output", wanted, path.display()));
+                return Err(Error::argument(option, wanted, path.display()));
             }
         }
         match &self.output {

@@ -13,7 +13,7 @@ use crate::io::{FieldFormat, NumberedFiles, check_sink, open_sink};
 use crate::parallel::{Progress, Threads};
 use crate::pipeline::{check_target, is_folder};
 use crate::synth::targets::{SCENES, TargetSceneOptions};
-use crate::synth::{Rounding, Scene, SceneOptions, Sensor, build, truth};
+use crate::synth::{Rounding, Scene, SceneOptions, Sensor, build, check_time, truth};
 use crate::types::{AnyFrame, Frame};
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -143,14 +143,16 @@ impl SynthCommand {
                 values: self.settings.clone(),
             },
         )?;
+        check_time(&*scene, "frames", (self.count() - 1) as f64)?;
         let formats = self.truth_formats()?;
         let (threads, _) = compute(&self.compute)?;
         let truth_files: Vec<NumberedFiles> = formats.iter().filter_map(|format| self.truth_files(*format)).collect();
         let paths = CommandPaths::default().writing_pictures("output", Some(output), "frame");
-        match &self.truth {
-            Some(folder) => paths.writing_files("truth", folder, [], truth_files).check(self.force)?,
-            None => paths.check(self.force)?,
-        }
+        let paths = match &self.truth {
+            Some(folder) => paths.writing_files("truth", folder, [], truth_files),
+            None => paths,
+        };
+        let _new_folders = paths.check(self.force)?;
         self.check_output(output)?;
         let bar = Bar::new(watch, "synth", self.messages.quiet);
         let written = self.write(&*scene, output, &formats, threads, &bar);
@@ -287,8 +289,10 @@ impl SynthCommand {
         if !is_folder(output) {
             check_target(output, self.force)?;
         }
-        for folder in [is_folder(output).then_some(output), self.truth.as_deref()].into_iter().flatten() {
-            check_folder(folder, self.force)?;
+        for (option, folder) in
+            [("output", Some(output).filter(|path| is_folder(path))), ("truth", self.truth.as_deref())]
+        {
+            folder.map_or(Ok(()), |folder| check_folder(option, folder, self.force))?;
         }
         Ok(())
     }

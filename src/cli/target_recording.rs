@@ -1,6 +1,8 @@
 //! Recordings of scenes of targets, for `jacoflow synth`: colour frames and the true boxes.
 
-use super::{interrupt::Watch, paths::CommandPaths, progress::Bar, report::Report, report::print_message};
+use super::{
+    interrupt::Watch, paths::CommandPaths, paths::NewFolders, progress::Bar, report::Report, report::print_message,
+};
 use crate::error::{Error, Result};
 use crate::io::{MotTable, check_sink, open_colour_sink};
 use crate::parallel::{Progress, Threads};
@@ -31,7 +33,7 @@ pub struct TargetRecording<'a> {
 impl TargetRecording<'_> {
     /// Renders and writes the recording.
     pub fn make(&self, threads: Threads, watch: &Watch) -> Result<Report> {
-        self.check_output()?;
+        let _new_folders = self.check_output()?;
         let scene = threads.install(|| TargetScene::new(self.scene, self.options))?;
         let bar = Bar::new(watch, "synth", self.quiet);
         let mut done = 0;
@@ -72,28 +74,30 @@ impl TargetRecording<'_> {
     }
 
     /// Refuses what could only fail after work has been done.
-    fn check_output(&self) -> Result<()> {
-        CommandPaths::default()
+    fn check_output(&self) -> Result<NewFolders> {
+        let new_folders = CommandPaths::default()
             .writing_pictures("output", Some(self.output), "frame")
             .writing("boxes", self.boxes)
             .check(self.force)?;
         check_sink(&self.output.to_string_lossy())?;
         if let Some(boxes) = self.boxes {
-            check_target(boxes, self.force)?;
+            check_target(boxes, self.force).map_err(|error| error.about("boxes"))?;
         }
-        if !is_folder(self.output) {
-            return check_target(self.output, self.force);
+        if is_folder(self.output) {
+            check_folder("output", self.output, self.force)?;
+        } else {
+            check_target(self.output, self.force)?;
         }
-        check_folder(self.output, self.force)
+        Ok(new_folders)
     }
 }
 
 /// Refuses a folder that is not empty, unless forced.
-pub fn check_folder(folder: &Path, force: bool) -> Result<()> {
+pub fn check_folder(option: &'static str, folder: &Path, force: bool) -> Result<()> {
     let occupied = folder.read_dir().is_ok_and(|mut entries| entries.next().is_some());
     if occupied && !force {
         let wanted = "an empty or new folder (--force writes into it)";
-        return Err(Error::argument("output", wanted, folder.display()));
+        return Err(Error::argument(option, wanted, folder.display()));
     }
     Ok(())
 }

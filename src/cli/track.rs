@@ -64,7 +64,7 @@ impl TrackCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
         let method = self.tracker.method()?;
-        self.paths(method).check(self.output.force)?;
+        let _new_folders = self.paths(method).check(self.output.force)?;
         if self.output.enlarge > 1 && self.output.overlay.is_none() && self.stereo.disparity_overlay.is_none() {
             return Err(Error::argument(
                 "enlarge",

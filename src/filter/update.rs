@@ -166,7 +166,7 @@ impl GaussianState {
         let squared: f64 = white.iter().map(|v| v * v).sum();
         let determinant: f64 = (0..k).map(|i| factor[i * k + i].ln()).sum::<f64>() * 2.0;
         self.log_likelihood[item] = -0.5 * (squared + determinant + k as f64 * std::f64::consts::TAU.ln());
-        self.mahalanobis[item] = squared.sqrt();
+        self.mahalanobis[item] = if squared.is_normal() { squared.sqrt() } else { norm(white) };
         true
     }
 
@@ -184,4 +184,13 @@ impl GaussianState {
         }
         self.finish(x, &mut P, failures, |_| true)
     }
+}
+
+/// Euclidean norm of numbers whose squares may leave the range of f64.
+fn norm(values: &[f64]) -> f64 {
+    let largest = values.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
+    if largest == 0.0 || largest.is_infinite() {
+        return values.iter().map(|v| v.abs()).sum();
+    }
+    largest * values.iter().map(|v| (v / largest).powi(2)).sum::<f64>().sqrt()
 }

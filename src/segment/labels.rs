@@ -52,7 +52,12 @@ pub fn region_means<T: Real>(labels: &[i32], count: usize, values: &[T], channel
     if let Some(wrong) = labels.iter().find(|&&label| label < 0 || label as usize >= count) {
         return Err(Error::argument("labels", format!("0 to {}", count as i64 - 1), wrong));
     }
-    let mut sums = vec![(0.0, 0u32); count * channels];
+    let mut sums: Vec<(f64, u32)> = Vec::new();
+    let bytes = count.checked_mul(channels).and_then(|n| n.checked_mul(size_of::<(f64, u32)>()));
+    if bytes.is_none() || sums.try_reserve_exact(count * channels).is_err() {
+        return Err(Error::memory("labels", bytes));
+    }
+    sums.resize(count * channels, (0.0, 0));
     if channels > 0 {
         for (&label, values) in labels.iter().zip(values.chunks_exact(channels)) {
             let sums = &mut sums[label as usize * channels..][..channels];

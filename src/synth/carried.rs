@@ -42,6 +42,9 @@ impl<X: Texture, M: Motion> Scene for Carried<X, M> {
     fn displacement(&self, x: f64, y: f64, t: f64, duration: f64) -> Option<(f64, f64)> {
         Some(self.motion.displacement(x, y, t, duration))
     }
+    fn max_duration(&self) -> f64 {
+        self.motion.max_duration()
+    }
     fn frame(&self, t: f64) -> Frame<f64> {
         let back = self.motion.path_map(t, 0.0);
         let origin = self.origin;

@@ -25,6 +25,6 @@ pub use disc::{RotatingDisc, radians_per_frame};
 pub use particles::{ParticleImages, ParticleLook};
 pub use ramp::RotatingRamp;
 pub use registry::{SceneOptions, build};
-pub use scene::Scene;
+pub use scene::{Scene, check_time};
 pub use sensor::{Rounding, Sensor};
 pub use truth::{mean_truth, truth};

@@ -166,6 +166,9 @@ impl<M: Motion> Scene for ParticleImages<M> {
     fn displacement(&self, x: f64, y: f64, t: f64, duration: f64) -> Option<(f64, f64)> {
         Some(self.motion.displacement(x, y, t, duration))
     }
+    fn max_duration(&self) -> f64 {
+        self.motion.max_duration()
+    }
     fn frame(&self, t: f64) -> Frame<f64> {
         let ((width, height), origin) = (self.size, self.origin);
         let mut frame = Frame::filled(width, height, self.look.background);

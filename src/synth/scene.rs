@@ -1,5 +1,6 @@
 //! What every scene has: brightness, flow and Jacobian at any point and time.
 
+use crate::error::{Error, Result};
 use crate::parallel::for_each_band;
 use crate::types::{AffineFlow, Frame};
 
@@ -29,11 +30,34 @@ pub trait Scene: Send + Sync {
         None
     }
 
+    /// Longest time, frames, between 0 and the time of a frame, and longest duration of a displacement.
+    fn max_duration(&self) -> f64 {
+        f64::INFINITY
+    }
+
     /// The frame of time `t`; rows are spread over the threads of the current pool.
     fn frame(&self, t: f64) -> Frame<f64> {
         let origin = self.origin();
         render(self.size(), |column, row| self.brightness(origin.0 + column as f64, origin.1 + row as f64, t))
     }
+}
+
+/// Refuses a time or a duration that is not finite or is too long for the paths of `scene`.
+///
+/// # Errors
+/// [`Error::Argument`] naming `argument`.
+pub fn check_time(scene: &dyn Scene, argument: &'static str, t: f64) -> Result<()> {
+    if t.is_finite() && t.abs() <= scene.max_duration() {
+        return Ok(());
+    }
+    Err(Error::argument(argument, time_range(scene, "a time"), t))
+}
+
+/// The times that `check_time` accepts, in words.
+pub(super) fn time_range(scene: &dyn Scene, times: &str) -> String {
+    let longest = scene.max_duration();
+    let range = if longest.is_finite() { format!("within {longest} of 0") } else { "finite".into() };
+    format!("{times} in frames, {range}")
 }
 
 /// A frame of `value(column, row)`, row bands in parallel.

@@ -1,7 +1,8 @@
 //! The truth of whole frames, as flow fields.
 
 use super::Scene;
-use crate::error::{Error, Result};
+use super::scene::{check_time, time_range};
+use crate::error::{Error, Result, numbers};
 use crate::parallel::for_each_band;
 use crate::types::{AffineFlow, FieldLayout, FlowField, Interval, MOTION_NAMES, SamplingGrid, Status, Units};
 
@@ -11,7 +12,7 @@ const STEP: f64 = 1e-3;
 /// The truth of a frame as a field: velocity and Jacobian at time `t`; [`Status::Masked`] without.
 ///
 /// # Errors
-/// None for a well-formed scene; passes on what [`FlowField::empty`] reports.
+/// [`Error::Argument`] naming `t` where it is not finite.
 pub fn truth(scene: &dyn Scene, t: f64) -> Result<FlowField<f64>> {
     field(scene, t, Interval::Instant, |x, y| scene.motion(x, y, t).map(AffineFlow::to_array))
 }
@@ -27,10 +28,12 @@ pub fn truth(scene: &dyn Scene, t: f64) -> Result<FlowField<f64>> {
 /// scene does not know.
 ///
 /// # Errors
-/// [`Error::Argument`] naming `between` where its times are not finite or equal.
+/// [`Error::Argument`] naming `between` where its times are equal, not finite or beyond
+/// [`Scene::max_duration`], and `t` where it is not finite.
 pub fn mean_truth(scene: &dyn Scene, t: f64, (from, to): (f64, f64)) -> Result<FlowField<f64>> {
-    if !(from.is_finite() && to.is_finite() && from != to) {
-        return Err(Error::argument("between", "two different times, frames", format!("({from}, {to})")));
+    let is_followed = |time| check_time(scene, "between", time).is_ok();
+    if !(is_followed(from) && is_followed(to) && from != to) {
+        return Err(Error::argument("between", time_range(scene, "two different times"), numbers(&[from, to])));
     }
     let since = |x: f64, y: f64, duration: f64| {
         if duration == 0.0 { scene.motion(x, y, t).map(|_| (0.0, 0.0)) } else { scene.displacement(x, y, t, duration) }
@@ -62,6 +65,9 @@ fn field(
     interval: Interval,
     motion: impl Fn(f64, f64) -> Option<[f64; 6]> + Sync,
 ) -> Result<FlowField<f64>> {
+    if !t.is_finite() {
+        return Err(Error::argument("t", "a finite time in frames", t));
+    }
     let layout = FieldLayout {
         frame_size: scene.size(),
         sites: SamplingGrid::default(),

@@ -8,7 +8,7 @@ use crate::io::Element;
 use crate::io::npz::NpzReader;
 use crate::simd::SimdReal;
 use crate::types::{AnyField, AnyFrame, FlowField, Precision, Sample, expect_dtype};
-use std::io::{Cursor, Read, Seek};
+use std::io::Cursor;
 use std::path::Path;
 
 /// Width and height of a field, and the values of its sites one after the other.
@@ -72,7 +72,7 @@ impl AnyFlowFilter {
         let full_scale = self.full_scale(dtype);
         if matches!(self.filter, Filter::Empty) {
             let options = FlowFilterOptions { full_scale, ..self.options.clone() };
-            self.filter = if self.precision.is_double(dtype) {
+            self.filter = if self.options.is_double(self.precision, dtype) {
                 Filter::Double(Box::new(FlowFilter::new(frame.size(), options)?))
             } else {
                 Filter::Single(Box::new(FlowFilter::new(frame.size(), options)?))
@@ -106,7 +106,7 @@ impl AnyFlowFilter {
             return Ok(Vec::new());
         }
         let options = FlowFilterOptions { full_scale: self.full_scale(dtype), ..self.options.clone() };
-        Ok(if self.precision.is_double(dtype) {
+        Ok(if self.options.is_double(self.precision, dtype) {
             self.smoothed::<f64>(options, frames)?.into_iter().map(AnyField::Double).collect()
         } else {
             self.smoothed::<f32>(options, frames)?.into_iter().map(AnyField::Single).collect()
@@ -174,7 +174,7 @@ impl AnyFlowFilter {
     /// [`Error::Io`]; [`Error::Format`] for a damaged file; [`Error::Argument`] naming `path` for a state
     /// that was saved with other options.
     pub fn load(&mut self, path: &Path) -> Result<()> {
-        let filter = if is_double(NpzReader::open(path)?)? {
+        let filter = if SavedFilter::is_double(&mut NpzReader::open(path)?)? {
             Filter::Double(Box::new(FlowFilter::load(path)?))
         } else {
             Filter::Single(Box::new(FlowFilter::load(path)?))
@@ -189,7 +189,7 @@ impl AnyFlowFilter {
 
     /// Replaces the state by that of [`to_bytes`](Self::to_bytes).
     pub fn restore(&mut self, bytes: &[u8], dtype: Option<&'static str>) -> Result<()> {
-        let filter = if is_double(NpzReader::new(Cursor::new(bytes), "filter state")?)? {
+        let filter = if SavedFilter::is_double(&mut NpzReader::new(Cursor::new(bytes), "filter state")?)? {
             Filter::Double(Box::new(FlowFilter::from_bytes(bytes)?))
         } else {
             Filter::Single(Box::new(FlowFilter::from_bytes(bytes)?))
@@ -225,11 +225,6 @@ impl AnyFlowFilter {
         self.dtype = dtype;
         Ok(())
     }
-}
-
-fn is_double<R: Read + Seek>(mut reader: NpzReader<R>) -> Result<bool> {
-    let saved = SavedFilter::describe(&mut reader)?;
-    Ok(saved.is_some_and(|saved| saved.precision == f64::DTYPE))
 }
 
 fn advance<T: SimdReal + Element>(

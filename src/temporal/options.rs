@@ -5,8 +5,12 @@ use crate::filter::SigmaPoints;
 use crate::jet::Neighbourhood;
 use crate::parallel::Threads;
 use crate::simd::Level;
-use crate::types::{Mask, SamplingGrid, Units, choices};
+use crate::types::{Mask, Precision, SamplingGrid, Units, choices};
 use serde::{Deserialize, Serialize};
+
+/// Least measurement noise for which single precision is the default, grey levels squared. With the patent's
+/// 1e-3 the two precisions differed by 33 standard deviations after 1500 still frames of white noise.
+const MIN_SINGLE_NOISE: f64 = 0.25;
 
 /// How the non-linear prediction is carried out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash, Serialize, Deserialize)]
@@ -171,6 +175,13 @@ impl FlowFilterOptions {
             initial_covariance: [1e4, 10.0, 10.0, 1.0, 1.0, 1.0, 10.0, 10.0, 0.01, 0.01, 0.01, 0.01],
             ..Self::patent()
         }
+    }
+
+    /// Whether frames of samples of type `dtype` are filtered in double precision. By default float64 frames
+    /// are, and all frames where the measurement noise is below 0.25 grey levels squared.
+    pub fn is_double(&self, precision: Precision, dtype: &str) -> bool {
+        let is_demanding = precision == Precision::Auto && self.measurement_noise < MIN_SINGLE_NOISE;
+        is_demanding || precision.is_double(dtype)
     }
 
     pub(super) fn motion_first(&self) -> bool {

@@ -205,6 +205,14 @@ impl SavedFilter {
         let Header { precision, frame_size, frames, repairs, .. } = header;
         Ok(Some(Self { precision, frame_size, frames, repairs, options }))
     }
+
+    /// Whether an archive holds the state of a filter in double precision.
+    ///
+    /// # Errors
+    /// Those of [`describe`](Self::describe).
+    pub fn is_double<R: Read + Seek>(reader: &mut NpzReader<R>) -> Result<bool> {
+        Ok(Self::describe(reader)?.is_some_and(|saved| saved.precision == precision::<f64>()))
+    }
 }
 
 /// numpy's name of the working precision.

@@ -111,6 +111,12 @@ fn a_mask_of_another_size_and_frames_of_another_size_are_refused() {
     let images = "a/frame_000000.png a/frame_000001.png b/frame_000000.png";
     let ended = place.line(&format!("flow {images} -o out"));
     assert!(ended.code != 0 && ended.err.contains("41"), "{}", ended.err);
+    // Where no field was written, no folder stays; one that was there does.
+    fs::create_dir(place.path("old")).unwrap();
+    for folder in ["new/deep", "old"] {
+        assert_ne!(place.line(&format!("flow b/frame_000000.png a/frame_000001.png -o {folder}")).code, 0);
+    }
+    assert!(!place.path("new").exists() && place.path("old").is_dir());
 }
 
 #[test]
@@ -283,6 +289,7 @@ fn no_file_is_written_by_two_options() {
         ("filter s.npy --points 5,5 -o x.csv --save-state x.csv", "save_state"),
         ("filter s.npy --points 5,5 -o x/ --save-state ./x/points.csv", "save_state"),
         ("filter s.npy -o x/ --save-state x/000001.npz", "save_state"),
+        ("filter s.npy -o x/ --save-state x/points.csv", "save_state"),
         ("egomotion s.npy --intrinsics 40,40,20,16 -o x.csv --alternatives ./x.csv", "alternatives"),
         ("track s.npy --method particle --box 5,5,9,9 --mot x --csv ./x", "csv"),
         ("track s.npy --method particle --box 5,5,9,9 -o x/ --csv x/tracks.csv", "csv"),
@@ -301,6 +308,26 @@ fn no_file_is_written_by_two_options() {
 fn scenes_without_end_are_refused() {
     let place = Place::new();
     fails(&place, "synth waves -o w --set speed=1e300", 2, &["speed: expected at most 16 wavelengths a frame"]);
+    let line = "synth turbulence -o w --size 8x8 --frames 30000";
+    fails(&place, line, 2, &["frames: expected a time in frames, within 25000 of 0, got 29999"]);
+    assert!(!place.path("w").exists());
+}
+
+#[test]
+fn a_place_that_is_taken_is_named_by_its_option() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 3 --size 40x32 --truth truth");
+    place.good("filter s.npy -o out/ --save-state state.npz");
+    fs::write(place.path("boxes.txt"), "").unwrap();
+    for (line, option) in [
+        ("synth affine -o t --size 40x32 --truth truth", "truth"),
+        ("synth cars_handheld -o t --boxes boxes.txt", "boxes"),
+        ("filter s.npy -o t/ --save-state state.npz", "save_state"),
+        ("stereo s.npy s.npy -o t --picture truth", "picture"),
+    ] {
+        fails(&place, line, 2, &[&format!("error: {option}: expected a"), "--force"]);
+        assert!(!place.path("t").exists(), "{line}");
+    }
 }
 
 #[test]

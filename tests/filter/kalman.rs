@@ -147,6 +147,17 @@ fn linear_filter_equals_filterpy() {
 }
 
 #[test]
+fn distances_are_finite_where_their_squares_are_not() {
+    for z in [3e200, 3e-200] {
+        let mut filter = KalmanFilter::new(1, 1, 1).unwrap();
+        (filter.F, filter.H) = (vec![1.0], vec![1.0]);
+        filter.update(&[z]).unwrap();
+        // P = R = 1, so that S = 2.
+        assert!((filter.mahalanobis[0] / (z / 2f64.sqrt()) - 1.0).abs() < 1e-12, "{}", filter.mahalanobis[0]);
+    }
+}
+
+#[test]
 fn of_a_measurement_the_components_that_are_there_are_used() {
     let mut filter = UnscentedFilter::new(3, 4, 2, SigmaPoints::default()).unwrap();
     set_up(&mut filter);

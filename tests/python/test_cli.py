@@ -58,3 +58,42 @@ def test_info_says_how_an_archive_of_frames_is_opened(tmp_path):
     np.savez(tmp_path / "frames.npz", frames=np.zeros((3, 8, 8)))
     result = run("info", "frames.npz", folder=tmp_path)
     assert result.returncode == 3 and "jacoflow.io.frames" in result.stderr
+
+
+def test_the_filter_of_the_command_is_that_of_python(tmp_path):
+    """In float64 where R is below 0.25, in both."""
+    frames = np.clip(np.round(jacoflow.scenes.Scene("affine", width=32, height=24).frames(3)), 0, 255).astype(np.uint8)
+    np.save(tmp_path / "frames.npy", frames)
+    for noise, dtype in ((None, np.float64), (0.25, np.float32)):
+        option = [] if noise is None else ["--measurement-noise", noise]
+        result = run("filter", "frames.npy", "-o", "out", "--force", "--profile", "measured", *option, folder=tmp_path)
+        assert result.returncode == 0, result.stderr
+        ours = jacoflow.FlowFilter(profile=jacoflow.FilterProfile("measured", R=noise))
+        last = [ours.push(frame) for frame in frames][-1]
+        assert last.flow.dtype == dtype
+        saved = jacoflow.FlowField.load(tmp_path / "out" / "000002.npz")
+        assert saved.flow.dtype == dtype
+        np.testing.assert_array_equal(saved.flow, last.flow)
+        assert ours.smooth(frames).flow.dtype == dtype
+
+
+def test_a_damaged_state_is_described_in_either_precision(tmp_path):
+    frames = np.random.default_rng(1).integers(0, 256, (2, 24, 32)).astype(np.uint8)
+    np.save(tmp_path / "frames.npy", frames)
+    for precision in ("float32", "float64"):
+        flow_filter = jacoflow.FlowFilter(precision=precision)
+        flow_filter.push(frames[0])
+        flow_filter.save(tmp_path / "state.npz")
+        good = dict(np.load(tmp_path / "state.npz"))
+        unknown = {name: np.array(array) for name, array in good.items()}
+        unknown["mean"].flat[3] = np.nan
+        for arrays, words in (
+            (unknown, "array 'mean' holds NaN, expected numbers from"),
+            ({**good, "mean": good["mean"][:-1]}, "expected mean of shape "),
+            ({name: array for name, array in good.items() if name != "root"}, "root"),
+        ):
+            np.savez(tmp_path / "damaged.npz", **arrays)
+            result = run("filter", "frames.npy", "-o", "out", "--start", 1, "--resume", "damaged.npz", folder=tmp_path)
+            assert result.returncode == 1 and words in result.stderr, result.stderr
+            assert "expected a state in" not in result.stderr
+            assert not (tmp_path / "out").exists()

@@ -83,6 +83,14 @@ def test_stub_and_compiled_module_say_the_same(name, stub, compiled):
     assert stub == inspect.cleandoc(compiled), name
 
 
+def test_the_stub_of_flow_has_the_options_of_estimate():
+    """stubtest leaves out `flow`, whose second frame only the stub requires."""
+    functions = {node.name: node for node in ast.parse((PACKAGE / "_jacoflow.pyi").read_text()).body if isinstance(node, ast.FunctionDef)}
+    flow, estimate = ({a.arg: ast.unparse(a.annotation) for a in functions[name].args.kwonlyargs} for name in ("flow", "estimate"))
+    assert {**flow, **{name: estimate[name] for name in ("ends", "pairs", "progress")}} == estimate
+    assert [*inspect.signature(_jacoflow.flow).parameters] == ["first", "second", "third", "more", *flow]
+
+
 @pytest.mark.parametrize("name", [name for name in MODULES if name not in ("jacoflow.__main__", "jacoflow._jacoflow")])
 def test_examples_in_docstrings_run(name):
     failures, _ = doctest.testmod(importlib.import_module(name), optionflags=doctest.ELLIPSIS)

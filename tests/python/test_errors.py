@@ -264,6 +264,9 @@ def test_options_are_named_as_the_user_wrote_them():
         assert len(str(error.value)) < 400
     with pytest.raises(TypeError, match="^region: expected four integers"):
         jacoflow.estimate(frames, grid=jacoflow.SamplingGrid(region="abcd"))
+    with pytest.raises(ValueError) as error:
+        jacoflow.estimate(frames, grid=jacoflow.SamplingGrid(region=(0, 0, 2**70, 3)))
+    assert str(error.value) == f"region: expected four integers (x, y, width, height) of 64 bits, got (0, 0, {2**70}, 3)"
     field = jacoflow.estimate(frames, ends="drop")[0]
     with pytest.raises(ValueError, match="^region: "):
         field.region_mean("curl", (0, 0, 600, 5))

@@ -5,6 +5,7 @@ import pathlib
 import subprocess
 import sys
 import threading
+import types
 
 import numpy as np
 import pytest
@@ -36,6 +37,18 @@ VIEWS = {
     "tracker": lambda frame: track.GradientTracker(frame),
     "stereo tracker": lambda frame: track.StereoTracker().update(frame, frame),
     "disparity": lambda frame: stereo.edge_disparity(frame, frame),
+    "batch filter": lambda frame: filters.KalmanFilter(1, 1).batch_filter(endless((2**36, 1), np.float32)),
+    "labels": lambda frame: segment.region_means(endless((2**18, 2**18), np.int32), frame),
+    "values": lambda frame: segment.region_means([[1]], frame),
+    "truths": lambda frame: segment.region_means([[1]], endless((2**18, 2**18), bool)),
+    "map": lambda frame: plot.scalar_map(frame),
+    "map of truths": lambda frame: plot.scalar_map(endless((2**18, 2**18), bool)),
+    "map of doubles": lambda frame: plot.scalar_map(endless((2**18, 2**18), float)),
+    "flow image": lambda frame: plot.flow_image(types.SimpleNamespace(flow=endless((2**18, 2**18, 2), float))),
+    "curl": lambda frame: plot.curl(types.SimpleNamespace(jacobian=endless((2**17, 2**17, 2, 2), np.float32))),
+    "wheel": lambda frame: plot.wheel_image(2**40),
+    "boxes": lambda frame: track.ParticleTracker(np.zeros((9, 9, 3), np.uint8), endless((2**36, 4), np.float32)),
+    "boxes of doubles": lambda frame: track.ParticleTracker(np.zeros((9, 9, 3), np.uint8), endless((2**36, 4), float)),
     "segments": lambda frame: segment.felzenszwalb(frame),
     "sensor": lambda frame: scenes.Sensor().apply(frame),
     "points": lambda frame: motion3d.estimate_motion(endless((2**36, 2), float), endless((2**36, 2), float)),
@@ -142,6 +155,15 @@ def test_objects_of_another_class_are_refused_by_name(call, name, tmp_path, monk
     monkeypatch.chdir(tmp_path)
     with pytest.raises(TypeError, match=f"^{name}: expected"):
         call()
+    assert not list(tmp_path.iterdir())
+
+
+def test_text_that_is_not_unicode_is_refused_by_name(tmp_path):
+    field = jacoflow.flow(*FRAMES[:2])
+    with pytest.raises(ValueError, match=r"^options: expected valid Unicode text, got 'made by \\ud800'"):
+        io.write_npz(tmp_path / "field.npz", field, options="made by \ud800")
+    with pytest.raises(ValueError, match="^name: expected valid Unicode text, got "):
+        scenes.Scene("\ud800")
     assert not list(tmp_path.iterdir())
 
 

@@ -1,6 +1,7 @@
 """Graph segmentation: published cases, scikit-image's partitions, inputs and mistakes."""
 
 import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -151,7 +152,11 @@ def test_a_pixel_that_is_not_finite_stays_alone(kind, bad):
     labels = segment.felzenszwalb(image, 300, 0.8, 1)
     assert labels[10, 10] == 1 and labels.sum() == 1
     assert not segment.felzenszwalb(image, 300, 0.8, 2).any()
-    assert count(np.full((3, 4), bad, kind), 1, 0.8, 0) == 12
+    with pytest.raises(ValueError, match="^image: expected at least one finite pixel, got none$"):
+        segment.felzenszwalb(np.full((3, 4), bad, kind), 1, 0.8, 0)
+    alone = np.full((3, 4), bad, kind)
+    alone[1, 2] = 0.5
+    assert count(alone, 1, 0.8, 0) == 12
 
 
 def test_limits():
@@ -216,3 +221,16 @@ def test_region_means_are_those_of_each_region():
 def test_mistakes_of_region_means_are_named(labels, values, error, message):
     with pytest.raises(error, match=message):
         segment.region_means(labels, values)
+
+
+def test_labels_whose_sums_memory_does_not_hold_are_an_error():
+    """The largest label alone decides how many sums there are."""
+    limited = (
+        "import resource, numpy as np; from jacoflow import segment\n"
+        "resource.setrlimit(resource.RLIMIT_AS, (2 << 30,) * 2)\n"
+        "assert segment.region_means([[2**20]], [[3.0]])[2**20] == 3\n"
+        "try: segment.region_means([[2**27]], [[1.0]])\n"
+        "except MemoryError as error: print(error)"
+    )
+    ended = subprocess.run([sys.executable, "-c", limited], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stdout) == (0, f"labels: expected what fits into memory, got {16 * (2**27 + 1)} bytes\n"), ended.stderr

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, assert_type
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 import jacoflow
@@ -32,6 +33,20 @@ def test_estimate() -> None:
     assert Status(int(field.status[5, 5])) is Status.OK
     points = jacoflow.estimate(stack, method=jacoflow.Windowed(neighbourhood=[(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1)]), grid=jacoflow.SamplingGrid(points=[(3, 4), (5, 6)]), ends="drop")
     assert points.shape == (2, 2)
+
+
+def test_counts_of_frames_are_checked() -> None:
+    """Each call is an error for mypy, which reports an `ignore` that is not needed, and raises."""
+    scene = scenes.Scene("affine", width=32, height=24, u=0.2)
+    a, b, c, d = scene.frame(0.0), scene.frame(1.0), scene.frame(2.0), scene.frame(3.0)
+    with pytest.raises(TypeError, match="two or three frames"):
+        jacoflow.flow(a)  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="two or three frames"):
+        jacoflow.flow(a, b, c, d)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="one stack or list of frames"):
+        jacoflow.estimate(a, b)  # type: ignore[arg-type]
+    assert_type(jacoflow.flow(a, b), FlowField)
+    assert_type(jacoflow.flow(a, b, c), FlowField)
 
 
 def test_streams(tmp_path: Path) -> None:

@@ -208,4 +208,6 @@ fn means_skip_what_is_no_number() {
     assert!(means[3..].iter().all(|mean| mean.is_nan()));
     assert!(region_means(&[0, 3], 3, &[0.0, 0.0], 1).unwrap_err().to_string().starts_with("labels: "));
     assert!(region_means(&[0, 1], 3, &[0.0], 1).unwrap_err().to_string().starts_with("values: "));
+    let beyond = region_means::<f64>(&[], usize::MAX / 16, &[], 1).unwrap_err().to_string();
+    assert!(beyond.starts_with("labels: expected what fits into memory, got "), "{beyond}");
 }

@@ -1,6 +1,6 @@
 //! The truth of whole frames, as flow fields.
 
-use jacoflow::synth::{SceneOptions, build, mean_truth, truth};
+use jacoflow::synth::{SceneOptions, build, check_time, mean_truth, truth};
 use jacoflow::types::Status;
 
 fn options(values: &[(&str, f64)]) -> SceneOptions {
@@ -67,4 +67,23 @@ fn what_has_no_truth_is_masked_and_bad_times_are_named() {
     for between in [(1.0, 1.0), (0.0, f64::NAN), (f64::INFINITY, 1.0)] {
         assert!(mean_truth(scene.as_ref(), 0.0, between).unwrap_err().to_string().contains("between"));
     }
+}
+
+#[test]
+fn integrated_paths_end_at_their_longest_duration() {
+    let size = options(&[]);
+    let scene = build("turbulence", &size).unwrap();
+    // 1e5 steps, 4 a frame.
+    assert_eq!((scene.max_duration(), build("ramp", &size).unwrap().max_duration()), (25_000.0, f64::INFINITY));
+    let refused = mean_truth(scene.as_ref(), 0.0, (0.0, 1e9)).unwrap_err().to_string();
+    assert_eq!(refused, "between: expected two different times in frames, within 25000 of 0, got (0, 1e9)");
+    let (x, y) = scene.displacement(1.0, 2.0, 0.0, 1e9).unwrap();
+    assert!(x.is_nan() && y.is_nan());
+    assert_eq!(check_time(scene.as_ref(), "t", -25_000.0).ok(), Some(()));
+    for bad in [25_001.0, f64::NAN, f64::NEG_INFINITY] {
+        assert!(
+            check_time(scene.as_ref(), "t", bad).unwrap_err().to_string().starts_with("t: expected a time in frames")
+        );
+    }
+    assert!(truth(scene.as_ref(), f64::NAN).unwrap_err().to_string().starts_with("t: expected a finite time"));
 }

@@ -3,7 +3,7 @@
 use super::gaussian::GaussianFilter;
 use crate::arrays;
 use crate::errors::Outcome;
-use jacoflow::error::{Error, shape_text};
+use jacoflow::error::{Error, check_memory, shape_text};
 use jacoflow::filter::Smoothed;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -11,9 +11,14 @@ use pyo3::prelude::*;
 /// An argument for each time.
 type Items<'py> = Vec<Option<Bound<'py, PyAny>>>;
 
-/// The items of a sequence.
+/// Least memory of an item of a sequence as an object of Python, bytes.
+const ITEM_BYTES: usize = 64;
+
+/// The items of a sequence. One that is longer than memory holds is refused: a view may have any length.
 pub fn items<'py>(name: &str, sequence: &Bound<'py, PyAny>) -> Outcome<Vec<Bound<'py, PyAny>>> {
     let got = sequence.get_type().name()?;
+    let length = sequence.len().unwrap_or(0);
+    check_memory(name, length.checked_mul(ITEM_BYTES))?;
     let wrong = |_| PyTypeError::new_err(format!("{name}: expected a sequence, got {got}"));
     Ok(sequence.try_iter().map_err(wrong)?.collect::<PyResult<_>>()?)
 }

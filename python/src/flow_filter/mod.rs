@@ -24,7 +24,8 @@ use std::path::PathBuf;
 /// Ix, Iy, Ixx, Ixy, Iyy, u, v, u_x, v_x, u_y, v_y) in 8-bit grey levels, px and frames. `profile` "patent"
 /// has the patent's constants, "measured" those for raw 8-bit frames (9 x 9 pixels); a `FilterProfile`
 /// replaces single ones. The noise adapts to frames that are not locally quadratic. The other options are
-/// those of `estimate`. Pickles in mid-stream.
+/// those of `estimate`, but for the default of `precision`: float64 also where `R` is below 0.25, as in both
+/// profiles. Pickles in mid-stream.
 #[pyclass(module = "jacoflow")]
 pub struct FlowFilter {
     arguments: Arguments,

@@ -73,7 +73,7 @@ impl TrackCommand {
                 return Err(Error::argument("graph", "a .png file", path.display()));
             }
             if !self.output.is_in_new_folder(path) {
-                check_target(path, self.output.force)?;
+                check_target(path, self.output.force).map_err(|error| error.about("graph"))?;
             }
         }
         if self.output.force {

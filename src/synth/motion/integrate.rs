@@ -3,12 +3,24 @@
 use super::PointMap;
 use crate::parallel::checkpoint;
 
-/// The map along the paths of the steady field `velocity` for `duration` frames: Runge-Kutta.
+/// Most steps along one path, a tenth of a second of work.
+const MAX_STEPS: f64 = 1e5;
+
+/// Longest duration of [`integrate`], frames.
+pub(super) fn max_duration(steps_per_frame: f64) -> f64 {
+    (MAX_STEPS / steps_per_frame).floor()
+}
+
+/// The map along the paths of the steady field `velocity` for `duration` frames: Runge-Kutta. NaN beyond
+/// [`max_duration`].
 pub(super) fn integrate<'a>(
     velocity: impl Fn(f64, f64) -> (f64, f64) + Send + Sync + 'a,
     duration: f64,
     steps_per_frame: f64,
 ) -> PointMap<'a> {
+    if duration.is_nan() || duration.abs() > max_duration(steps_per_frame) {
+        return Box::new(|_, _| (f64::NAN, f64::NAN));
+    }
     let steps = (duration.abs() * steps_per_frame).ceil();
     let h = if steps > 0.0 { duration / steps } else { 0.0 };
     Box::new(move |mut x, mut y| {

@@ -16,7 +16,7 @@ pub use vortex::LambOseen;
 pub use waves::Waves;
 
 use crate::types::AffineFlow;
-use integrate::integrate;
+use integrate::{integrate, max_duration};
 
 /// A map of the plane, prepared once for a time.
 pub type PointMap<'a> = Box<dyn Fn(f64, f64) -> (f64, f64) + Send + Sync + 'a>;
@@ -28,6 +28,11 @@ pub trait Motion: Send + Sync {
 
     /// The map that takes matter from its place at time `from` to its place at time `to`.
     fn path_map(&self, from: f64, to: f64) -> PointMap<'_>;
+
+    /// Longest time, frames, over which paths are followed: finite where they are integrated step by step.
+    fn max_duration(&self) -> f64 {
+        f64::INFINITY
+    }
 
     /// Velocity and its Jacobian where they are finite, as the truth of a scene.
     fn truth(&self, x: f64, y: f64, t: f64) -> Option<AffineFlow<f64>> {
@@ -48,5 +53,8 @@ impl<M: Motion + ?Sized> Motion for Box<M> {
     }
     fn path_map(&self, from: f64, to: f64) -> PointMap<'_> {
         (**self).path_map(from, to)
+    }
+    fn max_duration(&self) -> f64 {
+        (**self).max_duration()
     }
 }

@@ -1,6 +1,6 @@
 //! A random velocity field without divergence.
 
-use super::{Motion, PointMap, integrate};
+use super::{Motion, PointMap, integrate, max_duration};
 use crate::math::random::CounterRng;
 use crate::types::AffineFlow;
 use std::f64::consts::TAU;
@@ -83,5 +83,9 @@ impl Motion for Turbulence {
 
     fn path_map(&self, from: f64, to: f64) -> PointMap<'_> {
         integrate(move |x, y| self.speed(x, y), to - from, STEPS_PER_FRAME)
+    }
+
+    fn max_duration(&self) -> f64 {
+        max_duration(STEPS_PER_FRAME)
     }
 }

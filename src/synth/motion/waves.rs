@@ -1,6 +1,6 @@
 //! A smooth random velocity field of one scale.
 
-use super::{Motion, PointMap, integrate};
+use super::{Motion, PointMap, integrate, max_duration};
 use crate::math::random::CounterRng;
 use crate::types::AffineFlow;
 use std::f64::consts::TAU;
@@ -87,5 +87,9 @@ impl Motion for Waves {
 
     fn path_map(&self, from: f64, to: f64) -> PointMap<'_> {
         integrate(move |x, y| self.speed(x, y), to - from, self.steps_per_frame)
+    }
+
+    fn max_duration(&self) -> f64 {
+        max_duration(self.steps_per_frame)
     }
 }
