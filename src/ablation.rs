@@ -35,6 +35,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("flow.step_side", "narrow frames take no step"),
     ("flow.wide_remainder", "chance is compared in wide surroundings, too, before what is left widens the covariance"),
     ("flow.remainder", "what the frames leave of the flow in narrow windows widens its covariance"),
+    ("flow.continuation", "the motion of sites without data is reflected at the nearest ones with data"),
     ("flow.block_matches", "blocks are searched for on a coarse level"),
     ("flow.coarse_peak_locking", "peak locking is removed on every level before its motion is carried down"),
     ("flow.robust_peak_locking", "patches that scatter have little weight in peak locking"),

@@ -1,8 +1,8 @@
 """Coarse-to-fine estimate between frames that are not equally bright, beside saturated pixels, over large motions, beside
-a motion boundary (of three frames too) and of undersampled texture: errors, px; share of errors above 1 px that neither
-status nor standard deviation states; change by saturated pixels, standard deviations; bias of pairs in noise, px; errors in waves and in narrow frames, px; share
-of errors outside 95 % intervals, of undersampled texture and of discs that smoothness holds back, whose own errors are
-relative to their motion; time on equal frames."""
+a motion boundary (of three frames too), beside a mask's edge and of undersampled texture: errors, px; share of errors
+above 1 px that neither status nor standard deviation states; change by saturated pixels, standard deviations; bias of
+pairs in noise, px; errors in waves and in narrow frames, px; share of errors outside 95 % intervals, of undersampled
+texture and of discs that smoothness holds back, whose own errors are relative to their motion; time on equal frames."""
 
 from __future__ import annotations
 
@@ -27,6 +27,8 @@ NOISY = (0.5, 1.5, 2.5)
 NOISE = 4.0
 NARROW, NARROW_SHIFT = 6, (1.3, -0.6)
 """Height of frames that are few windows high, and their motion, px."""
+BESIDE, MASKED_SHIFT = 12, (2.6, -1.3)
+"""Width of what is compared beside a mask's edge, and the motion there, px."""
 RADIUS, ANGLES = 20.0, (0.02, 0.04)
 """Of discs, px, and their turns, rad."""
 SHIFTS = ((56, 0), (0, -64), (80, 60))
@@ -34,7 +36,11 @@ SHIFTS = ((56, 0), (0, -64), (80, 60))
 
 def rows() -> dict[str, list[float]]:
     """One value for each change and seed, each seed, each shift and seed."""
-    found: dict[str, list[float]] = {"equal": [], "changed": [], "specks": [], "shifts": [], "boundary": [], "three frames": [], "silent": [], "undersampled": [], "noise": [], "waves": [], "narrow": [], "outside": [], "discs": [], "disc errors": [], "ms": []}
+    names = (
+        "equal", "changed", "specks", "shifts", "boundary", "three frames", "silent", "undersampled", "noise",
+        "waves", "narrow", "mask", "outside", "discs", "disc errors", "ms",
+    )
+    found: dict[str, list[float]] = {name: [] for name in names}
     for seed in SEEDS:
         begun = time.process_time()
         found["equal"].append(error(scenes.changed_pair(seed, (3.3, -1.4)), (3.3, -1.4)))
@@ -77,6 +83,7 @@ def rows() -> dict[str, list[float]]:
         strip = [frame[20 : 20 + NARROW] for frame in scenes.changed_pair(seed, NARROW_SHIFT)]
         field = jacoflow.flow(*strip, covariance=False, threads=1).flow - np.array(NARROW_SHIFT)
         found["narrow"].append(float(np.sqrt(np.mean(np.sum(field[:, 8:-8] ** 2, axis=-1)))))
+        found["mask"].append(beside_mask(seed))
     for shift, seed in itertools.product(SHIFTS, SEEDS):
         field = jacoflow.flow(*scenes.shifted_speckle(seed, shift), covariance=False, threads=1)
         distance = np.linalg.norm(field.flow - np.array(shift), axis=-1)
@@ -97,6 +104,17 @@ def disc(seed: int, angle: float) -> tuple[float, float]:
     off = np.abs(field.u[inside] - truth)
     missed = np.mean(off > 1.96 * field.std("u")[inside])
     return float(missed), float(np.sqrt(np.mean(off**2) / np.mean(truth**2)))
+
+
+def beside_mask(seed: int) -> float:
+    """Root-mean-square error of the flow beside the edge of a mask that hides the right half, px."""
+    frames = scenes.changed_pair(seed, MASKED_SHIFT)
+    mask = np.ones(frames[0].shape, dtype=bool)
+    edge = mask.shape[1] // 2
+    mask[:, edge:] = False
+    field = jacoflow.flow(*frames, mask=mask, covariance=False, threads=1)
+    off = (field.flow - np.array(MASKED_SHIFT))[scenes.MARGIN : -scenes.MARGIN, edge - BESIDE : edge]
+    return float(np.sqrt(np.mean(np.sum(off**2, axis=-1))))
 
 
 def error(frames: list[scenes.Array], move: tuple[float, float]) -> float:

@@ -3,6 +3,7 @@
 use super::DescentPlan;
 use super::block_matches::block_matches;
 use super::comparison::Comparison;
+use super::continuation::continue_motion;
 use super::weighted_median::{BrightnessStd, sharpen_boundaries};
 use crate::ablation::keeps;
 use crate::flow::coarse_to_fine::brightness_scale::MIN_RESIDUAL_SHARE;
@@ -60,7 +61,7 @@ impl<T: SimdReal> Iteration<'_, T> {
     ) -> f64 {
         std::mem::swap(motion, old);
         rederive(old, motion);
-        self.iterate(level, smoothness, motion)
+        self.iterate(level, smoothness, (motion, old))
     }
 
     fn repeat(
@@ -127,15 +128,24 @@ impl<T: SimdReal> Iteration<'_, T> {
         space.keep(matches);
     }
 
-    /// Linearises about `motion` and updates it. Returns the root-mean-square change of the flow, px.
-    fn iterate(&mut self, level: &PyramidLevel<T>, smoothness: &Smoothness, motion: &mut Planes<T>) -> f64 {
+    /// Linearises about `motion` and updates it. Returns the root-mean-square change from `old`, px.
+    fn iterate(
+        &mut self,
+        level: &PyramidLevel<T>,
+        smoothness: &Smoothness,
+        (motion, old): (&mut Planes<T>, &Planes<T>),
+    ) -> f64 {
         checkpoint();
         let views = level.views(self.compared);
         let residuals = self.term.linearise(level.size, &views, motion, self.residual_std, self.data);
         self.residual_std = self.residual_std(residuals);
+        // On recordings the motion beyond the frame's edge is no better for it.
+        let has_holes = views.iter().any(|view| view.usable.is_some());
+        let continued = has_holes && keeps("flow.continuation") && continue_motion(self.data, motion);
         let contrast = self.plan.brightness.contrast;
         let floor = T::from_f64((MIN_NOISE_SHARE * contrast).powi(2).max(f64::from(f32::MIN_POSITIVE)));
-        regularize(self.plan.simd, self.data, motion, smoothness, floor, self.scratch)
+        let change = regularize(self.plan.simd, self.data, motion, smoothness, floor, self.scratch);
+        if continued { flow_change(old, motion) } else { change }
     }
 
     /// Robust standard deviation from the absolute values of residuals.
@@ -144,6 +154,14 @@ impl<T: SimdReal> Iteration<'_, T> {
         let floor = (MIN_RESIDUAL_SHARE * self.plan.brightness.contrast).max(f64::from(f32::MIN_POSITIVE));
         Some(T::from_f64(std + floor))
     }
+}
+
+/// Root-mean-square change of the flow, px.
+fn flow_change<T: SimdReal>(from: &Planes<T>, to: &Planes<T>) -> f64 {
+    let lines = (0..2).flat_map(|k| (0..to.height).map(move |y| (k, y)));
+    let pairs = lines.flat_map(|(k, y)| to.line(k, y).iter().zip(from.line(k, y)));
+    let squares: f64 = pairs.map(|(to, from)| (*to - *from).to_f64().powi(2)).sum();
+    (squares / (to.width * to.height) as f64).sqrt()
 }
 
 /// Whether no object is still moving between two iterations. Sites of the border do not count.

@@ -2,11 +2,13 @@
 //!
 //! `weighted_median` sharpens the flow at motion boundaries before an iteration; `iteration` is one
 //! linearisation with its regularised solution, and the unregularised trial;
+//! `continuation` sets the motion of sites without data;
 //! `block_matches` finds large motions; `comparison` takes the better of two motions at each site;
 //! `intermediate` refines a level before the next one; `given` lets a flow from elsewhere compete.
 
 mod block_matches;
 pub(super) mod comparison;
+mod continuation;
 mod given;
 mod intermediate;
 mod iteration;
