@@ -7,7 +7,7 @@ use crate::flow::{Estimator, Method};
 use crate::image::Preprocess;
 use crate::math::Real;
 use crate::simd::{SimdReal, same_mut};
-use crate::types::{AnyFrame, FlowField, Frame, Interval, Sample, Status, Units};
+use crate::types::{AnyFrame, FlowField, Frame, Interval, Mask, Sample, Status, Units};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -247,9 +247,9 @@ impl<T: SimdReal> FlowStream<T> {
             (Some(before), Some(after)) => (before - after).abs() > UNEVEN_STEPS * after,
             _ => false,
         };
-        // A frame without a finite sample is as good as lost.
-        let is_alone = is_uneven || !frames[0].data().iter().any(|value| value.finite());
-        let mut field = match self.plan.pair_estimator.as_ref().filter(|_| is_alone) {
+        let pair = self.plan.pair_estimator.as_ref();
+        let mask = self.plan.estimator.options().mask.as_ref();
+        let mut field = match pair.filter(|_| is_uneven || lacks_most(&frames, mask)) {
             Some(pair) => estimate_pooled(pair, &frames[reference..], first + reference)?,
             None => estimate_pooled(&self.plan.estimator, &frames, first)?,
         };
@@ -260,6 +260,20 @@ impl<T: SimdReal> FlowStream<T> {
         }
         Ok(field)
     }
+}
+
+/// Whether the first of some frames lacks most of the pixels that all others show: it is as good as lost.
+fn lacks_most<T: Real>(frames: &[&Frame<T>], mask: Option<&Mask>) -> bool {
+    let [first, others @ ..] = frames else { return false };
+    // Without a short circuit, so that the compiler uses lanes.
+    if first.data().iter().fold(true, |so_far, value| so_far & value.finite()) {
+        return false;
+    }
+    let is_shown = |frame: &Frame<T>, n: usize| frame.data()[n].finite();
+    let allowed = |&n: &usize| mask.and_then(|mask| mask.data().get(n)) != Some(&false);
+    let shown = (0..first.data().len()).filter(allowed).filter(|&n| others.iter().all(|frame| is_shown(frame, n)));
+    let (shown, by_first) = shown.fold((0, 0), |(all, own), n| (all + 1, own + usize::from(is_shown(first, n))));
+    2 * by_first < shown.max(1)
 }
 
 impl<T: Real> Drop for FlowStream<T> {

@@ -176,6 +176,20 @@ def test_a_lost_frame_costs_its_two_steps_only(frames):
         assert np.isnan(field.u[k]).all() and not field.valid[k].any()
 
 
+@pytest.mark.parametrize("shown", ["a half that the third does not show", "a twentieth"])
+def test_a_frame_that_shows_little_of_the_others_is_as_good_as_lost(frames, shown):
+    first, third = (np.ones(frames[0].shape, bool) for _ in range(2))
+    if shown == "a twentieth":
+        first = np.random.default_rng(1).random(first.shape) < 0.05
+    else:
+        first[:, 30:], third[:, :30] = False, False
+    before, middle, after = frames[:3].astype(np.float32)
+    before, after = np.where(first, before, np.nan), np.where(third, after, np.nan)
+    triple, pair = jacoflow.flow(before, middle, after), jacoflow.flow(middle, after)
+    assert pair.valid.mean() > 0.4
+    assert_array_equal(triple.u, pair.u)
+
+
 def test_masks_may_move(frames):
     hidden = np.zeros(frames.shape, bool)
     for k in range(len(frames)):

@@ -9,74 +9,85 @@ use crate::flow::coarse_to_fine::data_term::{MIN_USABLE_SHARE, MOTION, VALID};
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::simd::SimdReal;
 
+/// Column and row of a site.
+type Site = [i32; 2];
+/// In place of a site where there is none.
+const NONE: Site = [i32::MIN; 2];
+
 /// Sets the `motion` of every site whose window is hardly usable, after a linearisation to `data`. Slopes are
 /// those of the mirrored site; where that has no data either, the flow is that of the edge without slopes.
 /// Returns whether there are such sites.
 pub(super) fn continue_motion<T: SimdReal>(data: &Planes<T>, motion: &mut Planes<T>) -> bool {
-    let (width, height) = (motion.width, motion.height);
     let least = T::from_f64(MIN_USABLE_SHARE);
     let bare_in = |y: usize| data.line(VALID, y).iter().enumerate().filter(|(_, share)| **share < least);
-    let bare: Vec<usize> = (0..height).flat_map(|y| bare_in(y).map(move |(x, _)| y * width + x)).collect();
+    let bare: Vec<Site> = (0..data.height).flat_map(|y| bare_in(y).map(move |(x, _)| [x as i32, y as i32])).collect();
     if bare.is_empty() {
         return false;
     }
-    let nearest = nearest_with_data(&bare, (width, height));
-    let value = |motion: &Planes<T>, k: usize, site: usize| motion.at(k, site % width, site / width);
-    for site in bare {
-        let Some(edge) = nearest[site] else { continue };
-        let mirrored = mirror(site, edge, (width, height)).filter(|&other| nearest[other] == Some(other));
+    let nearest = Nearest::new(&bare, (data.width, data.height));
+    let value = |motion: &Planes<T>, k: usize, [x, y]: Site| motion.at(k, x as usize, y as usize);
+    for [x, y] in bare {
+        let edge = nearest.at([x, y]);
+        if edge == NONE {
+            continue;
+        }
+        let mirrored = [2 * edge[0] - x, 2 * edge[1] - y];
+        let is_known = nearest.at(mirrored) == mirrored;
         for k in 0..MOTION {
-            let there = mirrored.map(|other| value(motion, k, other));
             let here = value(motion, k, edge);
-            motion.line_mut(k, site / width)[site % width] = match (k < 2, there) {
-                (true, there) => here + here - there.unwrap_or(here),
-                (false, there) => there.unwrap_or(T::from_f64(0.0)),
+            motion.line_mut(k, y as usize)[x as usize] = match (k < 2, is_known) {
+                (true, true) => here + here - value(motion, k, mirrored),
+                (true, false) => here,
+                (false, true) => value(motion, k, mirrored),
+                (false, false) => T::from_f64(0.0),
             };
         }
     }
     true
 }
 
-/// The site as far beyond `edge` as `site` is on this side, if there is one.
-fn mirror(site: usize, edge: usize, (width, height): (usize, usize)) -> Option<usize> {
-    let x = (2 * (edge % width)).checked_sub(site % width).filter(|&x| x < width)?;
-    let y = (2 * (edge / width)).checked_sub(site / width).filter(|&y| y < height)?;
-    Some(y * width + x)
+/// For each site the nearest one with data, itself where it has data.
+struct Nearest {
+    sites: Vec<Site>,
+    size: (usize, usize),
 }
 
-/// For each site the nearest one that is not `bare`; `None` if all are bare. Layer by layer inwards each
-/// takes the nearest of those that its neighbours have.
-fn nearest_with_data(bare: &[usize], size: (usize, usize)) -> Vec<Option<usize>> {
-    let (width, height) = size;
-    let mut nearest: Vec<Option<usize>> = (0..width * height).map(Some).collect();
-    for &site in bare {
-        nearest[site] = None;
+impl Nearest {
+    /// Each site without data takes the nearest of what its neighbours have: those before it, row by row, and
+    /// then, from the last on, those after it (P.-E. Danielsson, "Euclidean distance mapping", 1980).
+    fn new(bare: &[Site], (width, height): (usize, usize)) -> Self {
+        let mut sites: Vec<Site> = (0..height).flat_map(|y| (0..width).map(move |x| [x as i32, y as i32])).collect();
+        for &[x, y] in bare {
+            sites[y as usize * width + x as usize] = NONE;
+        }
+        let mut nearest = Self { sites, size: (width, height) };
+        for &site in bare {
+            nearest.take(site, [[-1, 0], [-1, -1], [0, -1], [1, -1]]);
+        }
+        for &site in bare.iter().rev() {
+            nearest.take(site, [[1, 0], [1, 1], [0, 1], [-1, 1]]);
+        }
+        nearest
     }
-    let distance = |a: usize, b: usize| (a % width).abs_diff(b % width).pow(2) + (a / width).abs_diff(b / width).pow(2);
-    let is_beside = |site: &usize| neighbours(*site, size).any(|other| nearest[other].is_some());
-    let mut layer: Vec<usize> = bare.iter().copied().filter(is_beside).collect();
-    while !layer.is_empty() {
-        let found = |&site: &usize| {
-            let known = neighbours(site, size).filter_map(|other| nearest[other]);
-            known.min_by_key(|&known| (distance(site, known), known))
-        };
-        let found: Vec<_> = layer.iter().map(found).collect();
-        layer.iter().zip(found).for_each(|(&site, found)| nearest[site] = found);
-        let beside = layer.iter().flat_map(|&site| neighbours(site, size)).filter(|&other| nearest[other].is_none());
-        let mut next: Vec<usize> = beside.collect();
-        next.sort_unstable();
-        next.dedup();
-        layer = next;
-    }
-    nearest
-}
 
-/// The up to eight neighbours of a site.
-fn neighbours(site: usize, (width, height): (usize, usize)) -> impl Iterator<Item = usize> {
-    let (x, y) = (site % width, site / width);
-    let rows = y.saturating_sub(1)..(y + 2).min(height);
-    rows.flat_map(move |j| (x.saturating_sub(1)..(x + 2).min(width)).map(move |i| j * width + i))
-        .filter(move |&other| other != site)
+    /// [`NONE`] beyond the frame and where no site has data.
+    fn at(&self, [x, y]: Site) -> Site {
+        let (width, height) = self.size;
+        let is_inside = (0..width as i32).contains(&x) && (0..height as i32).contains(&y);
+        if is_inside { self.sites[y as usize * width + x as usize] } else { NONE }
+    }
+
+    fn take(&mut self, site: Site, neighbours: [Site; 4]) {
+        let distance = |other: Site| (site[0] - other[0]).pow(2) + (site[1] - other[1]).pow(2);
+        let mut best = self.at(site);
+        for [dx, dy] in neighbours {
+            let found = self.at([site[0] + dx, site[1] + dy]);
+            if found != NONE && (best == NONE || distance(found) < distance(best)) {
+                best = found;
+            }
+        }
+        self.sites[site[1] as usize * self.size.0 + site[0] as usize] = best;
+    }
 }
 
 #[cfg(test)]
@@ -111,6 +122,18 @@ mod tests {
             for k in 0..MOTION {
                 assert!((motion.at(k, x, y) - want[k]).abs() < 1e-12, "{x} {y} {k}");
             }
+        }
+    }
+
+    #[test]
+    fn the_nearest_site_is_found_from_all_sides() {
+        let (width, height) = (9, 7);
+        let bare: Vec<Site> = (1..6).flat_map(|y| (1..8).map(move |x| [x, y])).collect();
+        let nearest = Nearest::new(&bare, (width, height));
+        for &[x, y] in &bare {
+            let edge = nearest.at([x, y]);
+            let distance = (edge[0] - x).abs().max((edge[1] - y).abs());
+            assert_eq!(distance, x.min(8 - x).min(y).min(6 - y), "{x} {y}: {edge:?}");
         }
     }
 
