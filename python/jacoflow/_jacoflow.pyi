@@ -1668,7 +1668,7 @@ def _edge_pixels(
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...
 def _estimate_row_offset(left: ArrayLike, right: ArrayLike, options: dict[str, Any]) -> tuple[float, bool]: ...
 def _kind_of(
-    spec: _Path,
+    source: _Path,
     colour: str | None,
     grey: str | None,
     channel: int | None,
@@ -1678,7 +1678,7 @@ def _kind_of(
     step: int,
 ) -> str | None: ...
 def _open_frames(
-    spec: _Path,
+    source: _Path,
     colour: str | None,
     grey: str | None,
     channel: int | None,

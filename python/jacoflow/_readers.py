@@ -19,8 +19,9 @@ _STACKS: dict[str, Callable[[Request], FrameSource]] = {
     ".hdf5": _stacks.open_hdf5,
     ".mat": _stacks.open_matlab,
 }
-# Kinds of source, in the words of the compiled part, that only decoders of video read.
-_VIDEO = "ffmpeg"
+# Kinds of source, in the words of the compiled part: what only decoders of video read, TIFF by its content,
+# and what the compiled part does not read (None: nothing there, or a name that is not UTF-8).
+_VIDEO, _TIFF, _UNREAD = "ffmpeg", "tiff", ("unreadable", None)
 
 
 class FrameSource(Protocol):
@@ -108,7 +109,7 @@ def _open(request: Request) -> FrameSource:
     options = (request.colour, request.grey, *planes, request.start, request.stop, request.step)
     kind = _kind_of(path, *options)
     suffix = Path(path).suffix.lower()
-    if suffix in _STACKS:
+    if suffix in _STACKS and kind in _UNREAD:
         _expect_no_planes(request)
         return _STACKS[suffix](request)
     if request.key is not None:
@@ -116,7 +117,7 @@ def _open(request: Request) -> FrameSource:
     if kind == _VIDEO:
         _expect_no_planes(request)
         return _open_video(request)
-    if suffix in (".tif", ".tiff") and Path(path).is_file():
+    if kind == _TIFF:
         return _open_tiff(request, options)
     return _open_frames(path, *options)
 

@@ -24,6 +24,10 @@ _COLOUR_MODELS = ("MINISWHITE", "MINISBLACK", "RGB", "PALETTE", "YCBCR", "CFA")
 """PhotometricInterpretation of TIFF whose values are grey, or come as RGB."""
 
 
+_LARGEST_EXACT = 2**53
+"""Magnitude up to which float64 holds every integer."""
+
+
 class Stack:
     """Frames 0 to `count` of `get`, those of the request, by its rule for colour."""
 
@@ -46,8 +50,21 @@ class Stack:
         return _presented(self._get(self._indices.pop()), self._request)
 
 
+def _samples(frame: Frame, request: Request) -> Frame:
+    """A frame in the dtype of frames that holds its samples exactly, as of .npy files; in native byte order."""
+    kind, size = frame.dtype.kind, frame.dtype.itemsize
+    if kind not in "biuf" or size > 8:
+        raise FormatError(f"{request.source}: holds samples of type {frame.dtype}; expected integers or floats of up to 64 bits")
+    if size == 8 and kind in "iu" and not (-_LARGEST_EXACT <= int(frame.min(initial=0)) and int(frame.max(initial=0)) <= _LARGEST_EXACT):
+        raise FormatError(f"{request.source}: samples of 64 bits beyond 2^53, which float64 does not hold exactly")
+    narrow: dict[str, Any] = {"b": np.uint8, "u": np.uint8 if size == 1 else np.uint16, "i": np.float32, "f": np.float32}
+    wide = size > (4 if kind == "f" else 2)
+    return frame.astype(np.float64 if wide else narrow[kind], copy=False)
+
+
 def _presented(frame: Frame, request: Request) -> Frame:
-    """A frame by the rule for colour."""
+    """A frame by the rules for samples and for colour."""
+    frame = _samples(frame, request)
     if frame.ndim == 3 and frame.shape[2] == 1:
         frame = frame[..., 0]
     if frame.ndim == 3 and frame.shape[2] not in (3, 4):

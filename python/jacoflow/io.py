@@ -76,6 +76,10 @@ def frames(
     those of wider integers as float64 (`FormatError` beyond 2^53). Other kinds of TIFF are read through
     tifffile where that is installed, else refused with `MissingDependencyError`.
 
+    TIFF, Y4M and .npy files are recognised by their first bytes under any name, other files by the name, which
+    must be UTF-8. Recordings that no installed package helps with (.raw, .cih, .cine) are refused with
+    `FormatError`, which says how to convert them.
+
     Frames are grey, arrays (H, W); colour is refused unless `colour="luminance"`. With `colour="rgb"` they
     are arrays (H, W, 3) of red, green and blue; grey is then refused with `FormatError` unless
     `grey="repeat"`, which takes its level for all three. Y4M is converted by ITU-R BT.601, limited range

@@ -15,7 +15,7 @@ use jacoflow::io::{
 use jacoflow::types::{AnyColourFrame, AnyFrame};
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Which frames are read, and what is done with pictures of the other kind.
@@ -200,12 +200,13 @@ fn request(
     Ok((reading, options))
 }
 
-/// The name of the kind of source that would be opened, None where there is nothing; checks the options.
+/// The name of the kind of source that would be opened, None where there is nothing or the name is not UTF-8;
+/// checks the options.
 #[pyfunction(name = "_kind_of")]
-#[pyo3(signature = (spec, colour, grey, channel, z, start, stop, step))]
+#[pyo3(signature = (source, colour, grey, channel, z, start, stop, step))]
 #[expect(clippy::too_many_arguments, reason = "the options of jacoflow.io.frames")]
 pub fn source_kind(
-    #[pyo3(from_py_with = named::spec)] spec: PathBuf,
+    #[pyo3(from_py_with = named::source)] source: PathBuf,
     #[pyo3(from_py_with = named::colour)] colour: Option<&str>,
     #[pyo3(from_py_with = named::grey)] grey: Option<&str>,
     #[pyo3(from_py_with = named::channel)] channel: Option<Integer>,
@@ -215,16 +216,26 @@ pub fn source_kind(
     #[pyo3(from_py_with = named::step)] step: Integer,
 ) -> Outcome<Option<&'static str>> {
     request(colour, grey, channel, z, start, stop, step)?;
-    Ok(kind_of(&spec.to_string_lossy()))
+    Ok(source.to_str().and_then(kind_of))
+}
+
+/// A path as the text that names sources and sinks; refused where it is not UTF-8, as a replaced character
+/// would name another file.
+fn in_utf8(argument: &'static str, path: &Path) -> Outcome<String> {
+    let expected = "a name in UTF-8 (rename the file, or pass the folder that holds it)";
+    match path.to_str() {
+        Some(text) => Ok(text.into()),
+        None => Err(Error::argument(argument, expected, path.display()).into()),
+    }
 }
 
 /// Opens a frame source.
 #[pyfunction(name = "_open_frames")]
-#[pyo3(signature = (spec, colour, grey, channel, z, start, stop, step))]
+#[pyo3(signature = (source, colour, grey, channel, z, start, stop, step))]
 #[expect(clippy::too_many_arguments, reason = "the options of jacoflow.io.frames")]
 pub fn open_frames(
     py: Python<'_>,
-    #[pyo3(from_py_with = named::spec)] spec: PathBuf,
+    #[pyo3(from_py_with = named::source)] source: PathBuf,
     #[pyo3(from_py_with = named::colour)] colour: Option<&str>,
     #[pyo3(from_py_with = named::grey)] grey: Option<&str>,
     #[pyo3(from_py_with = named::channel)] channel: Option<Integer>,
@@ -234,7 +245,7 @@ pub fn open_frames(
     #[pyo3(from_py_with = named::step)] step: Integer,
 ) -> Outcome<PyFrameSource> {
     let (reading, options) = request(colour, grey, channel, z, start, stop, step)?;
-    let spec = spec.to_string_lossy().into_owned();
+    let spec = in_utf8("source", &source)?;
     let source = abandonable(py, move || Source::open(&spec, reading, &options))?;
     Ok(PyFrameSource { source: Arc::new(Mutex::new(source)) })
 }
@@ -247,7 +258,7 @@ pub fn write_frames(
     frames: &Bound<'_, PyAny>,
     #[pyo3(from_py_with = named::frame_rate)] frame_rate: f64,
 ) -> Outcome<usize> {
-    let spec = path.to_string_lossy().into_owned();
+    let spec = in_utf8("path", &path)?;
     let mut items = frames.try_iter()?;
     let first = items.next().ok_or_else(|| Error::argument("frames", "at least one frame (H, W)", "none"))??;
     let is_colour = arrays::as_array("frames", &first)?.ndim() == 3;

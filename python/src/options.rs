@@ -110,7 +110,7 @@ pub mod named {
             }
         )*};
     }
-    arguments!(aggregate alpha augmented backward batch beta between blur_sigma carrier channel classes colour colour_cast count covariance diagnostics dim_x dim_z duration ends forward_backward fps frame_rate frames grey grid height index initial interval kappa left_right_check length_unit levels mask max_count max_steps method min_distance min_eigenvalue min_step n n_components n_near n_particles name neighbourhood_sigma noise options origin pairs path pixel_pitch points precision preprocess prior_radius profile quality random_state redraw rounding saturate scale scheme search sigma simd spec start step stop subpixel t temporal threads threshold time time_scheme truncate update_first width window x y);
+    arguments!(aggregate alpha augmented backward batch beta between blur_sigma carrier channel classes colour colour_cast count covariance diagnostics dim_x dim_z duration ends forward_backward fps frame_rate frames grey grid height index initial interval kappa left_right_check length_unit levels mask max_count max_steps method min_distance min_eigenvalue min_step n n_components n_near n_particles name neighbourhood_sigma noise options origin pairs path pixel_pitch points precision preprocess prior_radius profile quality random_state redraw rounding saturate scale scheme search sigma simd source start step stop subpixel t temporal threads threshold time time_scheme truncate update_first width window x y);
 }
 
 /// The argument `region`, any sequence (x, y, width, height), px.

@@ -8,7 +8,7 @@ use super::report::{Report, print};
 use super::run::pixel_size;
 use crate::error::{Error, Result};
 use crate::io::npz::NpzReader;
-use crate::io::{FlowImage, FrameSource, OpenOptions, read_flo, read_kitti, read_npz, read_pfm};
+use crate::io::{FlowImage, FrameSource, OpenOptions, kind_of, read_flo, read_kitti, read_npz, read_pfm};
 use crate::parallel::Progress;
 use crate::temporal::SavedFilter;
 use crate::types::AnyFrame;
@@ -113,6 +113,10 @@ fn statistics(values: impl Iterator<Item = f64>) -> Value {
 /// What a result file holds; `None`: not a result file by its name (or, for PNG, its kind of pixels).
 fn result_info(path: &Path) -> Option<Result<Value>> {
     let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+    // Recordings are recognised by their content under any name.
+    if path.to_str().and_then(kind_of).is_some_and(|kind| matches!(kind, "tiff" | "y4m" | "npy")) {
+        return None;
+    }
     match extension.as_str() {
         "flo" => Some(read_flo(path).map(|flow| flow_image_info(path, "flo", &flow))),
         "pfm" => Some(read_pfm(path).map(|map| {

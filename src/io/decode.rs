@@ -46,12 +46,15 @@ pub fn read_plane<P: ChannelPolicy>(path: impl AsRef<Path>, policy: P, selection
     read_one_picture(path, policy)
 }
 
+/// First bytes of TIFF and BigTIFF files of either byte order.
+pub(crate) const TIFF_SIGNATURES: &[&[u8]] = &[b"II*\0", b"II+\0", b"MM\0*", b"MM\0+"];
+
 /// Whether the file begins as a TIFF or BigTIFF of either byte order.
 pub(crate) fn is_tiff(path: &Path) -> Result<bool> {
     let file = File::open(path).map_err(|e| Error::io(path, e))?;
     let mut signature = Vec::new();
     file.take(4).read_to_end(&mut signature).map_err(|e| Error::io(path, e))?;
-    Ok(matches!(&signature[..], b"II*\0" | b"II+\0" | b"MM\0*" | b"MM\0+"))
+    Ok(TIFF_SIGNATURES.contains(&&signature[..]))
 }
 
 /// A reader of the picture, and the bytes that it may take.

@@ -215,8 +215,8 @@ pub(super) fn status_codes<T>(field: &FlowField<T>) -> Vec<u8> {
 /// Reads a field, in working precision.
 ///
 /// # Errors
-/// [`Error::Io`] when it cannot be read; [`Error::Format`] when it is no such file, damaged, or its arrays do
-/// not fit together.
+/// [`Error::Io`] when it cannot be read; [`Error::Format`] when it is no such file, damaged, its arrays do
+/// not fit together, or its covariance has a negative variance or is not finite at a valid site.
 pub fn read_npz<T: Real>(path: impl AsRef<Path>) -> Result<StoredField<T>> {
     read_npz_from(&mut NpzReader::open(path)?)
 }
@@ -260,7 +260,28 @@ pub fn read_npz_from<T: Real, R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<
         height,
         layout,
     };
+    if let Some(flaw) = flaw_of_covariance(&field) {
+        return Err(npz.wrong("covariance", &flaw));
+    }
     Ok(StoredField { field, options: metadata.options, library: metadata.library })
+}
+
+/// What is wrong with stored covariance: a negative variance, or a value that is not finite at a valid site.
+fn flaw_of_covariance<T: Real>(field: &FlowField<T>) -> Option<String> {
+    let planes = field.covariance.as_ref()?;
+    let (p, n) = (field.layout.parameters.len(), field.len());
+    // Row k of the upper triangle begins with a variance and has p - k values.
+    let mut variances = (0..p).scan(0, |next, k| Some(std::mem::replace(next, *next + p - k)));
+    let negative = variances.find_map(|plane| {
+        let site = planes[plane * n..(plane + 1) * n].iter().position(|value| value.to_f64() < 0.0)?;
+        Some(("a negative variance", site))
+    });
+    let (what, site) = negative.or_else(|| {
+        let at =
+            planes.iter().enumerate().position(|(at, value)| !value.finite() && field.status[at % n].is_valid())?;
+        Some(("a value that is not finite where the field is valid", at % n))
+    })?;
+    Some(format!("holds {what}, at row {}, column {}", site / field.width, site % field.width))
 }
 
 fn read_points<R: Read + Seek>(npz: &mut NpzReader<R>) -> Result<Vec<(usize, usize)>> {

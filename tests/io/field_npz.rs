@@ -63,6 +63,32 @@ fn a_field_with_flipped_bytes_is_refused_or_the_same() {
 }
 
 #[test]
+fn covariance_that_is_none_is_refused_but_not_where_there_is_no_estimate() {
+    let damaged = |plane: usize, site: usize, value: f32| {
+        let mut field = numbered(SamplingGrid::default());
+        let at = plane * field.len() + site;
+        field.covariance.as_mut().unwrap()[at] = value;
+        read_npz_from::<f32, _>(&mut stored(&field)).map(|_| ()).map_err(|error| error.to_string())
+    };
+    let last = numbered(SamplingGrid::default()).len() - 1;
+    // Planes 0, 6 and 20 hold variances of the first, second and last parameter.
+    for (plane, value, what) in [
+        (0, -1.0, "a negative variance, at row 1, column 2"),
+        (6, -1.0, "a negative variance"),
+        (20, -1.0, "a negative variance"),
+        (20, f32::NAN, "not finite where the field is valid, at row 1, column 2"),
+        (1, f32::INFINITY, "not finite"),
+    ] {
+        let message = damaged(plane, 9, value).unwrap_err();
+        assert!(message.contains("x.npz") && message.contains("'covariance'") && message.contains(what), "{message}");
+    }
+    assert!(damaged(6, last, -1.0).is_err());
+    for (plane, site, value) in [(1, 9, -1.0), (6, last, f32::NAN), (20, last, f32::INFINITY)] {
+        assert_eq!(damaged(plane, site, value), Ok(()));
+    }
+}
+
+#[test]
 fn flow_and_jacobian_are_arranged_for_numpy() {
     let mut npz = stored(&numbered(SamplingGrid::default()));
     let n = 35.0;

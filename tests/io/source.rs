@@ -9,6 +9,15 @@ fn specifications_find_their_kind() {
     let inside = |name: &str| folder.path().join(name).to_string_lossy().into_owned();
     std::fs::write(inside("video.mp4"), b"x").unwrap();
     std::fs::write(inside("odd[1].png"), b"x").unwrap();
+    let signatures: [(&str, &[u8]); 4] = [
+        ("pages.dat", b"MM\0+"),
+        ("stack.tif", b"\x93NUMPY\x01\0"),
+        ("video.npz", b"YUV4MPEG2 W2 H2"),
+        ("short", b"II*"),
+    ];
+    for (name, start) in signatures {
+        std::fs::write(inside(name), start).unwrap();
+    }
     for (spec, kind) in [
         ("-".to_string(), Some("y4m")),
         (inside("a.Y4M"), Some("y4m")),
@@ -20,6 +29,10 @@ fn specifications_find_their_kind() {
         (inside("*.png"), Some("glob")),
         (inside("video.mp4"), Some("ffmpeg")),
         (inside("nothing.mp4"), None),
+        (inside("pages.dat"), Some("tiff")),
+        (inside("stack.tif"), Some("npy")),
+        (inside("video.npz"), Some("y4m")),
+        (inside("short"), Some("ffmpeg")),
     ] {
         assert_eq!(kind_of(&spec), kind, "{spec}");
     }

@@ -37,6 +37,18 @@ fn a_folder_is_read_in_natural_order_and_other_files_are_left_out() {
 }
 
 #[test]
+fn numbers_of_any_padding_are_compared_by_their_value() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = ["f.png", "f0.png", "f1.png", "f01.png", "f001b2.png", "f1b10.png", "f009.png", "f10.png", "f0100.png"];
+    for (i, name) in names.iter().enumerate().rev() {
+        grey(i as u8).save(folder.path().join(name)).unwrap();
+    }
+    let expected: Vec<f64> = (0..names.len()).map(|i| i as f64).collect();
+    assert_eq!(first_samples(folder.path(), &OpenOptions::default()), expected);
+    assert_eq!(first_samples(&folder.path().join("f*.png"), &OpenOptions::default()), expected);
+}
+
+#[test]
 fn nothing_to_read_is_said() {
     let folder = tempfile::tempdir().unwrap();
     for spec in [folder.path().to_path_buf(), folder.path().join("*.png")] {

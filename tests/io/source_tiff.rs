@@ -73,6 +73,18 @@ fn large_files_and_thumbnails_are_read() {
 }
 
 #[test]
+fn pages_are_read_under_any_name() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["stack", "stack.stk", "stack.lsm", "stack.btf", "stack.dat", "stack.npz", "stack.txt", "stack.png"] {
+        let path = folder.path().join(name);
+        write(TiffEncoder::new(File::create(&path).unwrap()).unwrap(), 4, "", |_| false);
+        assert_eq!(levels(&path, PlaneSelection::default()).unwrap(), [0.0, 1.0, 2.0, 3.0], "{name}");
+        write(TiffEncoder::new_big(File::create(&path).unwrap()).unwrap(), 2, "", |_| false);
+        assert_eq!(levels(&path, PlaneSelection::default()).unwrap(), [0.0, 1.0], "{name}");
+    }
+}
+
+#[test]
 fn integers_become_the_type_that_holds_them() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("s.tif");
@@ -104,13 +116,20 @@ fn other_files_have_no_channels() {
 #[test]
 fn files_that_only_others_read_say_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, advice) in
-        [("a.npz", "key="), ("a.MAT", "scipy"), ("a.raw", "numpy.fromfile"), ("a.cine", "16-bit TIFF")]
-    {
+    for (name, advice, is_read_in_python) in [
+        ("a.npz", "key=", true),
+        ("a.MAT", "scipy", true),
+        ("a.raw", "numpy.fromfile", false),
+        ("a.cih", "16-bit TIFF", false),
+        ("a.cine", "16-bit TIFF", false),
+    ] {
         let path = folder.path().join(name);
         std::fs::write(&path, "x").unwrap();
         let error = open(&path.to_string_lossy(), &OpenOptions::default()).err().unwrap();
-        assert!(matches!(&error, Error::Missing(words) if words.contains(advice) && words.contains(name)), "{error}");
+        let words = error.to_string();
+        assert!(words.contains(advice) && words.contains(name), "{words}");
+        assert_eq!(matches!(error, Error::Missing(_)), is_read_in_python, "{words}");
+        assert_eq!(matches!(error, Error::Format { .. }), !is_read_in_python, "{words}");
     }
     let absent = open(&folder.path().join("b.raw").to_string_lossy(), &OpenOptions::default()).err().unwrap();
     assert!(matches!(absent, Error::Io { .. }), "{absent}");

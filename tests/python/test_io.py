@@ -1,6 +1,8 @@
 """Frames and flow in and out of files."""
 
+import os
 import pickle
+import sys
 
 import numpy as np
 import pytest
@@ -171,6 +173,50 @@ def test_samples_above_the_maximum_of_a_pgm_are_refused(content, tmp_path):
     (tmp_path / "a.pnm").write_bytes(content)
     with pytest.raises(jacoflow.FormatError, match="holds a sample of (101|1001|10); expected at most (100|1000|9), the maximum in its header"):
         io.read_image(tmp_path / "a.pnm", colour="luminance")
+
+
+@pytest.mark.parametrize("saved", ["a.npy", "a.y4m"])
+@pytest.mark.parametrize("name", ["a", "a.dat", "a.npz", "a.tif"])
+def test_stacks_are_read_under_any_name(frames, saved, name, tmp_path):
+    frames = [frame.astype(np.uint8) for frame in frames]
+    io.write_frames(tmp_path / saved, frames)
+    (tmp_path / saved).rename(tmp_path / name)
+    assert_array_equal(list(io.frames(tmp_path / name)), frames)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+@pytest.mark.parametrize("suffix", [b".npy", b".tif", b".y4m"])
+def test_names_that_are_not_utf8_are_refused_by_argument(frames, suffix, tmp_path):
+    path = os.fsdecode(os.fsencode(tmp_path) + b"/n\xe9" + suffix)
+    with open(path, "wb") as file:
+        np.save(file, np.array(frames))
+    with pytest.raises(ValueError, match="^source: expected a name in UTF-8"):
+        io.frames(path)
+    with pytest.raises(ValueError, match="^path: expected a name in UTF-8"):
+        io.write_frames(path, frames)
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
+def test_archives_are_read_under_names_that_are_not_utf8(frames, tmp_path):
+    path = os.fsdecode(os.fsencode(tmp_path) + b"/n\xe9.npz")
+    with open(path, "wb") as file:
+        np.savez(file, np.array(frames))
+    assert_array_equal(list(io.frames(path)), frames)
+
+
+@pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
+def test_a_field_with_damaged_variances_is_refused(value, tmp_path):
+    path = tmp_path / "field.npz"
+    field = jacoflow.flow(*jacoflow.scenes.Scene("affine", width=32, height=32).frames(3), covariance=True)
+    assert field.valid[16, 16]
+    field.save(path)
+    io.read_npz(path)
+    arrays = dict(np.load(path))
+    arrays["covariance"][0, 16, 16] = value
+    np.savez(path, **arrays)
+    with pytest.raises(jacoflow.FormatError, match=r"field\.npz: .*'covariance' holds .* at row 16, column 16"):
+        io.read_npz(path)
 
 
 def test_a_field_of_negative_width_is_named(tmp_path):

@@ -267,6 +267,20 @@ def test_other_kinds_are_read_through_tifffile(tmp_path, monkeypatch):
         io.frames(path, channel=1)
 
 
+@pytest.mark.parametrize("name", ["s", "s.stk", "s.btf", "s.tf8", "s.bak", "s.dat", "s.npz"])
+def test_all_pages_are_read_under_any_name(name, tmp_path):
+    path = tmp_path / name
+    tifffile.imwrite(tmp_path / "s.tif", STACK, photometric="minisblack", metadata=None)
+    (tmp_path / "s.tif").rename(path)
+    assert_array_equal(read(path), STACK)
+    done = subprocess.run([sys.executable, "-m", "jacoflow", "info", str(path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "frames        5" in done.stdout, done.stderr
+    # Kinds that only tifffile reads are found under any name, too.
+    with open(path, "wb") as file:
+        tifffile.imwrite(file, STACK, photometric="minisblack", compression="png", metadata=None)
+    assert_array_equal(read(path), STACK)
+
+
 def test_the_binary_reads_the_same(tmp_path):
     path = tmp_path / "stack.tif"
     tifffile.imwrite(path, CHANNELS, imagej=True, compression="zstd", resolution=(4, 4), metadata={"axes": "TCYX", "finterval": 0.5, "unit": "um"})

@@ -13,6 +13,7 @@ use tempfile::TempDir;
 pub(super) const KIND: Kind = Kind {
     name: "ffmpeg",
     accepts: |spec| Path::new(spec).is_file(),
+    signatures: &[],
     has_planes: false,
     members: super::no_members,
     open: |spec, options| Ok(Box::new(FfmpegSource::open_with("ffmpeg", spec, options.colour)?)),

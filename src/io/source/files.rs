@@ -1,11 +1,12 @@
-//! Image files: a folder of them, or one (whose pages are frames when it is a TIFF).
+//! Image files: a folder of them, or one (whose pages are frames when it is a TIFF, under any name).
 
 use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
 use crate::io::channels::{ChannelPolicy, Colour, FrameFormat};
-use crate::io::decode::{EXTENSIONS, is_tiff, read_plane};
+use crate::io::decode::{EXTENSIONS, TIFF_SIGNATURES, is_tiff, read_plane};
 use crate::io::pages::Pages;
 use crate::io::planes::{PixelSize, PlaneSelection};
+use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 pub(super) const KIND: Kind = Kind {
@@ -13,11 +14,16 @@ pub(super) const KIND: Kind = Kind {
     accepts: |spec| {
         Path::new(spec).is_dir() || (has_extension(spec, EXTENSIONS) && (Path::new(spec).exists() || !is_pattern(spec)))
     },
+    signatures: &[],
     has_planes: true,
     members: |spec| images_in(Path::new(spec)).unwrap_or_default(),
     open: |spec, options| open_files(spec, options.colour, options.planes),
     open_colour: |spec, options| open_files(spec, options.grey, options.planes),
 };
+
+/// TIFF files, by their content alone; the pages are frames.
+pub(super) const TIFF: Kind =
+    Kind { name: "tiff", accepts: |_| false, signatures: TIFF_SIGNATURES, members: super::no_members, ..KIND };
 
 /// Whether the text has a pattern's special characters.
 pub(super) fn is_pattern(spec: &str) -> bool {
@@ -58,9 +64,42 @@ fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Natural order of the names; equal ones (`1`, `01`) by their bytes.
+/// Natural order: runs of digits by their value, all other text by its bytes; names that differ only in the
+/// padding of their numbers (`1`, `01`) by length, then by their bytes.
 pub(super) fn sort_naturally(paths: &mut [PathBuf]) {
-    paths.sort_by(|a, b| natord::compare(&a.to_string_lossy(), &b.to_string_lossy()).then_with(|| a.cmp(b)));
+    paths.sort_by(|a, b| {
+        let [left, right] = [a, b].map(|path| path.as_os_str().as_encoded_bytes());
+        natural_order(left, right).then_with(|| left.len().cmp(&right.len())).then_with(|| left.cmp(right))
+    });
+}
+
+fn natural_order(mut left: &[u8], mut right: &[u8]) -> Ordering {
+    loop {
+        let order = match (left.first(), right.first()) {
+            (Some(a), Some(b)) if a.is_ascii_digit() && b.is_ascii_digit() => {
+                let (number, other) = (take_number(&mut left), take_number(&mut right));
+                number.len().cmp(&other.len()).then_with(|| number.cmp(other))
+            }
+            (Some(a), Some(b)) => {
+                (left, right) = (&left[1..], &right[1..]);
+                a.cmp(b)
+            }
+            (a, b) => return a.is_some().cmp(&b.is_some()),
+        };
+        if order.is_ne() {
+            return order;
+        }
+    }
+}
+
+/// Takes the digits at the front of `text`; returns them without leading zeros, so that the longer number is
+/// the larger one.
+fn take_number<'a>(text: &mut &'a [u8]) -> &'a [u8] {
+    let end = text.iter().position(|byte| !byte.is_ascii_digit()).unwrap_or(text.len());
+    let (digits, rest) = text.split_at(end);
+    *text = rest;
+    let zeros = digits.iter().take_while(|&&digit| digit == b'0').count();
+    &digits[zeros..]
 }
 
 /// What every later frame must be like.

@@ -8,6 +8,7 @@ use std::path::PathBuf;
 pub(super) const KIND: Kind = Kind {
     name: "glob",
     accepts: is_pattern,
+    signatures: &[],
     has_planes: true,
     members: |spec| matches(spec).unwrap_or_default(),
     open: |spec, options| Ok(Box::new(FilesSource::new(matches(spec)?, options.colour)?.with_planes(options.planes))),

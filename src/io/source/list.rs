@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 pub(super) const KIND: Kind = Kind {
     name: "list",
     accepts: |spec| has_extension(spec, &["txt", "lst"]),
+    signatures: &[],
     has_planes: true,
     members: |spec| listed(Path::new(spec)).unwrap_or_default(),
     open: |spec, options| {

@@ -23,6 +23,8 @@ use super::planes::{PixelSize, PlaneSelection};
 use super::{channels::Colour, channels::Grey};
 use crate::error::{Error, Result};
 use crate::types::{AnyColourFrame, AnyFrame};
+use std::fs::File;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// How a source is opened: what to do with colour or grey, which planes of a file with channels or slices are
@@ -123,6 +125,8 @@ pub type ColourSource = dyn FrameSource<AnyColourFrame>;
 struct Kind {
     name: &'static str,
     accepts: fn(&str) -> bool,
+    /// First bytes by which its files are recognised under any name; empty: by the name alone.
+    signatures: &'static [&'static [u8]],
     /// Whether its files may be TIFF, with channels and slices.
     has_planes: bool,
     /// The files in what the specification names, where it is not one file; those that can be listed.
@@ -131,10 +135,16 @@ struct Kind {
     open_colour: fn(&str, &OpenOptions) -> Result<Box<ColourSource>>,
 }
 
-/// Every kind of source; the first that accepts a specification opens it.
-const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KIND, unreadable::KIND, ffmpeg::KIND];
+/// Every kind of source; the first whose signature a file has, else the first that accepts the specification,
+/// opens it.
+const KINDS: &[Kind] =
+    &[files::TIFF, y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KIND, unreadable::KIND, ffmpeg::KIND];
 
-/// Opens a source of grey frames by its specification.
+/// Length of the longest signature, bytes.
+const SIGNATURE_BYTES: u64 = 10;
+
+/// Opens a source of grey frames by its specification. Files of TIFF, Y4M and numpy (`.npy`) are recognised
+/// by their first bytes under any name, all others by the name.
 ///
 /// | specification | source |
 /// |---|---|
@@ -145,13 +155,13 @@ const KINDS: &[Kind] = &[y4m::KIND, npy::KIND, list::KIND, files::KIND, glob::KI
 /// | a folder | its PNG, TIFF, BMP, PGM and JPEG files in natural order |
 /// | an image file | its picture, or the pages of a TIFF (along time, see [`PlaneSelection`]) |
 /// | `*`, `?`, `[` in it | the image files it matches, in natural order |
-/// | `*.npz`, `*.h5`, `*.mat`, `*.raw`, `*.mraw`, `*.cine` | refused, with what can be done |
+/// | `*.npz`, `*.h5`, `*.mat`, `*.raw`, `*.mraw`, `*.cih`, `*.cine` | refused, with what can be done |
 /// | another file | compressed video, through an `ffmpeg` on the `PATH`; likewise |
 ///
 /// # Errors
-/// [`Error::Io`] when there is nothing of that name, [`Error::Format`] when it is not what it seems,
-/// [`Error::Argument`] for a `step` of 0 or a plane that it does not have, [`Error::Missing`] for video
-/// without `ffmpeg` and for files that only the Python package reads.
+/// [`Error::Io`] when there is nothing of that name, [`Error::Format`] when it is not what it seems or
+/// is read by no part of the package, [`Error::Argument`] for a `step` of 0 or a plane that it does not have,
+/// [`Error::Missing`] for video without `ffmpeg` and for files that only the Python package reads.
 pub fn open(spec: &str, options: &OpenOptions) -> Result<Box<dyn FrameSource>> {
     let source = (kind_for(spec, options)?.open)(spec, options)?;
     Ok(Box::new(Selected::new(source, options)?))
@@ -172,7 +182,7 @@ fn kind_for(spec: &str, options: &OpenOptions) -> Result<&'static Kind> {
     if options.step == 0 {
         return Err(Error::argument("step", "a positive integer", 0));
     }
-    let kind = KINDS.iter().find(|kind| (kind.accepts)(spec)).ok_or_else(|| nothing_there(spec))?;
+    let kind = kind_accepting(spec).ok_or_else(|| nothing_there(spec))?;
     match options.planes.given() {
         Some(option) if !kind.has_planes => {
             Err(Error::argument(option, "none, as only TIFF files name such an axis", spec))
@@ -181,15 +191,36 @@ fn kind_for(spec: &str, options: &OpenOptions) -> Result<&'static Kind> {
     }
 }
 
+/// The kind of source that opens `spec`: by the first bytes of a file, else by its name.
+fn kind_accepting(spec: &str) -> Option<&'static Kind> {
+    let start = first_bytes(spec);
+    let has_signature = |kind: &&Kind| kind.signatures.iter().any(|signature| start.starts_with(signature));
+    KINDS.iter().find(has_signature).or_else(|| KINDS.iter().find(|kind| (kind.accepts)(spec)))
+}
+
+/// The first bytes of a regular file; none of others (a pipe would lose them) and of standard input. A file
+/// that cannot be read is reported by the source that opens it.
+fn first_bytes(spec: &str) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    if spec != "-"
+        && Path::new(spec).is_file()
+        && let Ok(file) = File::open(spec)
+        && file.take(SIGNATURE_BYTES).read_to_end(&mut bytes).is_err()
+    {
+        bytes.clear();
+    }
+    bytes
+}
+
 /// The name of the kind of source that `spec` would be opened as.
 pub fn kind_of(spec: &str) -> Option<&'static str> {
-    KINDS.iter().find(|kind| (kind.accepts)(spec)).map(|kind| kind.name)
+    kind_accepting(spec).map(|kind| kind.name)
 }
 
 /// The files that a source of this specification reads: the one named, and those in a folder or a list or
 /// matched by a pattern. What cannot be listed is left out, as opening the source reports it.
 pub fn files_read(spec: &str) -> Vec<PathBuf> {
-    let kind = KINDS.iter().find(|kind| (kind.accepts)(spec));
+    let kind = kind_accepting(spec);
     let members = kind.map(|kind| (kind.members)(spec)).unwrap_or_default();
     std::iter::once(PathBuf::from(spec)).chain(members).collect()
 }

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 pub(super) const KIND: Kind = Kind {
     name: "npy",
     accepts: |spec| has_extension(spec, &["npy"]),
+    signatures: &[b"\x93NUMPY"],
     has_planes: false,
     members: super::no_members,
     open: |spec, options| Ok(Box::new(NpySource::open(spec, options.colour)?)),

@@ -6,15 +6,17 @@ use std::path::Path;
 
 pub(super) const KIND: Kind = Kind {
     name: "unreadable",
-    accepts: |spec| Path::new(spec).is_file() && advice(spec).is_some(),
+    accepts: |spec| Path::new(spec).is_file() && is_known(spec),
+    signatures: &[],
     has_planes: true,
     members: super::no_members,
     open: refuse,
     open_colour: refuse,
 };
 
-/// Endings of names, what such files are, and what can be done with them.
-const KNOWN: [(&[&str], &str); 5] = [
+/// Endings of names, what such files are and what can be done with them, of those that the Python package
+/// reads.
+const READ_IN_PYTHON: [(&[&str], &str); 2] = [
     (
         &["npz"],
         "an archive of numpy arrays: open it in Python with jacoflow.io.frames(path, key=...), or save the stack (T, H, W) as .npy",
@@ -23,6 +25,10 @@ const KNOWN: [(&[&str], &str); 5] = [
         &["h5", "hdf5", "mat"],
         "HDF5 or MATLAB: open it in Python with jacoflow.io.frames(path, key=...) (needs the package h5py, for MATLAB files before 7.3 scipy), or save the stack (T, H, W) as .npy",
     ),
+];
+
+/// The same of those that no part of the package reads, with any dependency.
+const READ_NOWHERE: [(&[&str], &str); 3] = [
     (
         &["raw", "bin", "dat"],
         "samples without a header: in Python frames = numpy.fromfile(path, dtype).reshape(T, H, W), then pass the array or save it with numpy.save as .npy",
@@ -37,10 +43,17 @@ const KNOWN: [(&[&str], &str); 5] = [
     ),
 ];
 
-fn advice(spec: &str) -> Option<&'static str> {
-    KNOWN.iter().find(|(endings, _)| has_extension(spec, endings)).map(|(_, advice)| *advice)
+fn advice(spec: &str, known: &[(&[&str], &'static str)]) -> Option<&'static str> {
+    known.iter().find(|(endings, _)| has_extension(spec, endings)).map(|(_, advice)| *advice)
+}
+
+fn is_known(spec: &str) -> bool {
+    advice(spec, &READ_IN_PYTHON).or_else(|| advice(spec, &READ_NOWHERE)).is_some()
 }
 
 fn refuse<S: ?Sized>(spec: &str, _: &OpenOptions) -> Result<Box<S>> {
-    Err(Error::Missing(format!("{spec}: {}", advice(spec).unwrap_or("not read"))))
+    Err(match advice(spec, &READ_IN_PYTHON) {
+        Some(advice) => Error::Missing(format!("{spec}: {advice}")),
+        None => Error::format(spec, advice(spec, &READ_NOWHERE).unwrap_or("not read")),
+    })
 }

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 pub(super) const KIND: Kind = Kind {
     name: "y4m",
     accepts: |spec| spec == "-" || has_extension(spec, &["y4m"]),
+    signatures: &[b"YUV4MPEG2 "],
     has_planes: false,
     members: super::no_members,
     open: |spec, options| open_stream(spec, options.colour),
