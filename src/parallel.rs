@@ -2,6 +2,7 @@
 
 mod interrupt;
 
+pub(crate) use interrupt::shared_checkpoint;
 pub use interrupt::{Interrupt, checkpoint};
 
 use crate::error::{Error, Result};

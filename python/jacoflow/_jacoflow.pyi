@@ -670,7 +670,7 @@ class FlowFilter:
         Where a neighbourhood holds NaN or a masked pixel the filter only predicts, and the result is NaN with
         status NON_FINITE. Where the frame contradicts the prediction (black, flashed, dropped) the motion is
         that of the frames before, with status PREDICTED. ValueError for a frame of another size, TypeError
-        for another dtype; the filter is then unchanged.
+        for another dtype; the filter is then unchanged. Ctrl-C stops the work and forgets every frame.
         """
     def smooth(self, /, frames: _Frames) -> FlowField:
         """The fields of all `frames` (T, H, W), a stack of T, each from the frames before and after it.

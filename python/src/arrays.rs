@@ -2,13 +2,14 @@
 
 use super::samples::{exact_samples, is_masked, refuse_non_array, sample_type};
 use crate::errors::{Outcome, Raised};
+use crate::options::shown;
 use jacoflow::buffer_pool;
 use jacoflow::error::{Error, check_memory, shape_text};
 use jacoflow::track::GreyLevels;
 use jacoflow::types::{AnyFrame, Frame, Mask, Sample};
 use numpy::ndarray::{ArrayView, IntoDimension, ShapeBuilder};
 use numpy::{Element, PyArray, PyArrayDyn, PyArrayMethods, PyUntypedArray, PyUntypedArrayMethods};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 /// Sample types that frames may have, for messages.
@@ -212,7 +213,9 @@ pub fn boolean(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<Mask> {
     check_size(argument, &array)?;
     let [height, width] = array.shape()[..] else {
         let got = shape_text(array.shape());
-        return Err(PyValueError::new_err(format!("{argument}: expected shape (H, W), got {got}")).into());
+        let moving = "for a mask that moves give the frames as masked arrays, numpy.ma.array(frames, mask=hidden)";
+        let advice = if argument == "mask" && array.shape().len() == 3 { format!("; {moving}") } else { String::new() };
+        return Err(PyValueError::new_err(format!("{argument}: expected shape (H, W), got {got}{advice}")).into());
     };
     let Some(values) = elements::<bool>(&array) else {
         return Err(PyTypeError::new_err(format!(
@@ -261,12 +264,31 @@ pub fn doubles(argument: &'static str, object: &Bound<'_, PyAny>) -> Outcome<(Ve
     check_size(argument, &array)?;
     let kind: String = array.dtype().getattr("kind")?.extract()?;
     if !matches!(kind.as_str(), "f" | "i" | "u") {
-        return Err(
-            PyTypeError::new_err(format!("{argument}: expected real numbers, got {}", dtype_name(&array))).into()
-        );
+        return Err(not_real(argument, &array)?.into());
     }
     let wide = array.call_method1("astype", ("float64",))?.cast_into::<PyUntypedArray>()?;
     Ok((array.shape().to_vec(), elements::<f64>(&wide).unwrap_or_default()))
+}
+
+/// The answer to an array without numbers. Python's own integers can be too large for numpy, whose array of
+/// objects says nothing about them.
+fn not_real(argument: &str, array: &Bound<'_, PyUntypedArray>) -> Outcome<PyErr> {
+    let refuse = |got: String| PyTypeError::new_err(format!("{argument}: expected real numbers, got {got}"));
+    if dtype_name(array) != "object" {
+        return Ok(refuse(dtype_name(array)));
+    }
+    for item in array.getattr("flat")?.try_iter()? {
+        let item = item?;
+        match item.extract::<f64>() {
+            Ok(_) => {}
+            Err(error) if error.is_instance_of::<PyOverflowError>(array.py()) => {
+                let message = format!("{argument}: expected numbers up to 1.8e308, got {}", shown(&item));
+                return Ok(PyValueError::new_err(message));
+            }
+            Err(_) => return Ok(refuse(kind_of(&item))),
+        }
+    }
+    Ok(refuse("an array of objects".into()))
 }
 
 /// Two numbers, out of anything numpy can read as such.

@@ -38,7 +38,7 @@ fn optional(from: &Bound<'_, PyDict>, name: &'static str) -> Outcome<Option<Arra
 /// A count: an integer, positive; which ones are too small the core says.
 pub(super) fn count(from: &Bound<'_, PyDict>, name: &'static str) -> Outcome<usize> {
     let value: super::options::Integer = entry(from, name)?;
-    usize::try_from(value.0).map_err(|_| Error::argument(name, "a positive integer", value.0).into())
+    usize::try_from(value.0).map_err(|_| Error::argument(name, "a positive integer", value).into())
 }
 
 /// The prior of covariances: nothing, a number or a matrix.

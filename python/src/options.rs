@@ -11,21 +11,22 @@ use jacoflow::types::{Mask, Precision, Rect, Sample, SamplingGrid, Units};
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::{PyOverflowError, PyTypeError, PyUnicodeEncodeError, PyValueError};
 use pyo3::prelude::*;
+use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
 
-/// An integer argument. One that 64 bits do not hold becomes the nearest that they do, so that it is refused
+/// An integer argument. One that 128 bits do not hold becomes the nearest that they do, so that it is refused
 /// by name where it is out of range.
 #[derive(Debug, Clone, Copy, IntoPyObject, IntoPyObjectRef)]
 #[pyo3(transparent)]
-pub struct Integer(pub i64);
+pub struct Integer(pub i128);
 
 impl<'py> FromPyObject<'_, 'py> for Integer {
     type Error = PyErr;
 
     fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
-        match object.extract::<i64>() {
+        match object.extract::<i128>() {
             Err(error) if error.is_instance_of::<PyOverflowError>(object.py()) => {
-                Ok(Self(if object.lt(0)? { i64::MIN } else { i64::MAX }))
+                Ok(Self(if object.lt(0)? { i128::MIN } else { i128::MAX }))
             }
             value => Ok(Self(value?)),
         }
@@ -94,7 +95,7 @@ fn argument<'a, 'py, T: Argument + FromPyObject<'a, 'py>>(name: &str, value: &'a
 const MAX_SHOWN: usize = 40;
 
 /// The beginning of a value's text.
-fn shown(value: &Bound<'_, PyAny>) -> String {
+pub fn shown(value: &Bound<'_, PyAny>) -> String {
     let words = value.repr().map_or_else(|_| "another value".into(), |text| text.to_string());
     words.chars().take(MAX_SHOWN).collect()
 }
@@ -175,22 +176,41 @@ pub fn word(py: Python<'_>, object: &Object) -> Option<String> {
     object.as_ref()?.extract(py).ok()
 }
 
+impl Display for Integer {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            i128::MAX => f.write_str("one above 2^127"),
+            i128::MIN => f.write_str("one below -2^127"),
+            value => value.fmt(f),
+        }
+    }
+}
+
+impl Integer {
+    /// The nearest unsigned number of 64 bits below 2^63; `None` below 0.
+    pub fn clamped(self) -> Option<usize> {
+        usize::try_from(self.0.min(i64::MAX.into())).ok()
+    }
+}
+
 /// A count of at least one.
-pub fn count(name: &'static str, Integer(value): Integer) -> Outcome<usize> {
-    usize::try_from(value)
-        .ok()
-        .filter(|&n| n > 0)
-        .ok_or_else(|| Error::argument(name, "a positive integer", value).into())
+pub fn count(name: &'static str, value: Integer) -> Outcome<usize> {
+    if value.0 > i64::MAX.into() {
+        return Err(Error::argument(name, "a positive integer below 2^63", value).into());
+    }
+    value.clamped().filter(|&n| n > 0).ok_or_else(|| Error::argument(name, "a positive integer", value).into())
 }
 
 /// A count or an index, at least 0.
-pub fn natural(name: &'static str, Integer(value): Integer) -> Outcome<usize> {
-    Ok(usize::try_from(value).map_err(|_| Error::argument(name, "an integer of 0 or more", value))?)
+pub fn natural(name: &'static str, value: Integer) -> Outcome<usize> {
+    Ok(value.clamped().ok_or_else(|| Error::argument(name, "an integer of 0 or more", value))?)
 }
 
 /// `threads`: a positive number, or all.
 pub fn threads(value: Option<Integer>) -> Outcome<Threads> {
-    Ok(Threads::new(value.map(|n| count("threads", n)).transpose()?)?)
+    // More than there are processors for is no mistake.
+    let most = |Integer(n)| Integer(i128::min(n, i64::MAX.into()));
+    Ok(Threads::new(value.map(|n| count("threads", most(n))).transpose()?)?)
 }
 
 /// `simd`: the name of an instruction set that the processor has.
@@ -304,7 +324,10 @@ pub fn units(py: Python<'_>, pitch: &Object, length: Option<&str>, fps: &Object)
 
 /// `precision=None | "float32" | "float64"`.
 pub fn precision(name: Option<&str>) -> Outcome<Precision> {
-    Ok(name.map_or(Ok(Precision::Auto), Precision::parse)?)
+    let Some(name) = name else { return Ok(Precision::Auto) };
+    // "auto" is the command line's word for None.
+    let unknown = |_| Error::argument("precision", "\"float32\" or \"float64\"", format!("{name:?}"));
+    Ok(Precision::parse(name).map_err(unknown)?)
 }
 
 /// `region`: (x, y, width, height), px.

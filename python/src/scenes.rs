@@ -115,8 +115,8 @@ impl Scene {
         #[pyo3(from_py_with = named::count)] count: Integer,
         #[pyo3(from_py_with = named::start)] start: f64,
     ) -> Outcome<Bound<'py, PyAny>> {
-        let wrong = |_| Error::argument("count", "zero or a positive integer", count.0);
-        let count = usize::try_from(count.0).map_err(wrong)?;
+        let wrong = || Error::argument("count", "zero or a positive integer", count);
+        let count = count.clamped().ok_or_else(wrong)?;
         check_time(self.core.as_ref(), "start", start)?;
         check_time(self.core.as_ref(), "count", start + count.saturating_sub(1) as f64)?;
         let (width, height) = self.core.size();

@@ -32,7 +32,7 @@ impl TargetScene {
     /// An index of a frame, refused by name where there is none.
     fn index(&self, t: Integer) -> Outcome<usize> {
         let count = self.core.frame_count();
-        let expected = || Error::argument("t", format!("a frame from 0 to {}", count - 1), t.0);
+        let expected = || Error::argument("t", format!("a frame from 0 to {}", count - 1), t);
         Ok(usize::try_from(t.0).ok().filter(|&t| t < count).ok_or_else(expected)?)
     }
 
@@ -46,9 +46,9 @@ impl TargetScene {
             return Err(Error::argument("targets", format!("indices, at most {MAX_LISTED}"), length).into());
         }
         for target in targets.try_iter()? {
-            let Integer(target) = target?.extract()?;
+            let target: Integer = target?.extract()?;
             let expected = || Error::argument("targets", format!("indices from 0 to {}", count - 1), target);
-            *usize::try_from(target).ok().and_then(|k| drawn.get_mut(k)).ok_or_else(expected)? = true;
+            *usize::try_from(target.0).ok().and_then(|k| drawn.get_mut(k)).ok_or_else(expected)? = true;
         }
         Ok(drawn)
     }
@@ -79,8 +79,8 @@ impl TargetScene {
         #[pyo3(from_py_with = named::frames)] frames: Option<Integer>,
         #[pyo3(from_py_with = named::colour_cast)] colour_cast: f64,
     ) -> Outcome<Self> {
-        let count = |Integer(count): Integer| {
-            usize::try_from(count).map_err(|_| Error::argument("frames", "a positive integer", count))
+        let count = |count: Integer| {
+            usize::try_from(count.0).map_err(|_| Error::argument("frames", "a positive integer", count))
         };
         let options =
             TargetSceneOptions { random_state, scale, noise, frames: frames.map(count).transpose()?, colour_cast };

@@ -38,6 +38,24 @@ impl Failures {
         self.check()
     }
 
+    /// As [`add_infinite`](Self::add_infinite), for a function in place of vector arithmetic. A state for which
+    /// `plain`, the result of that arithmetic, is not finite either has left the range of numbers: its function
+    /// is not at fault.
+    ///
+    /// # Errors
+    /// [`Error::Numerical`] too when no state is left.
+    pub(super) fn add_out_of_range(&mut self, name: &'static str, results: &mut [f64], plain: &[f64]) -> Result<()> {
+        let width = results.len() / self.marks.len();
+        for (item, (results, plain)) in results.chunks_exact_mut(width).zip(plain.chunks_exact(width)).enumerate() {
+            let is_finite = |values: &[f64]| values.iter().all(|v| v.is_finite());
+            if !is_finite(results) && !is_finite(plain) {
+                self.add(item, Error::Numerical(format!("the step of state {item} has outgrown the range of numbers")));
+                results.fill(0.0);
+            }
+        }
+        self.add_infinite(name, results)
+    }
+
     /// The first reason when every state failed.
     pub(super) fn check(&mut self) -> Result<()> {
         match self.first.take_if(|_| self.marks.iter().all(|failed| *failed)) {

@@ -5,7 +5,7 @@
 
 use super::checks::{check_measurement, expect, shared};
 use super::failures::Failures;
-use super::manifold::Manifold;
+use super::manifold::{Manifold, Vectors};
 use super::state::GaussianState;
 use crate::error::{Error, Result};
 use crate::math::dense::{
@@ -74,7 +74,9 @@ impl GaussianState {
         let known: Vec<f64> = z.iter().zip(measured.predicted).map(|(z, p)| if z.is_nan() { *p } else { *z }).collect();
         let mut y = vec![0.0; z.len()];
         manifold.residual_z(&known, measured.predicted, &mut y)?;
-        failures.add_infinite("residual_z", &mut y)?;
+        let mut plain = vec![0.0; y.len()];
+        Vectors.residual_z(&known, measured.predicted, &mut plain)?;
+        failures.add_out_of_range("residual_z", &mut y, &plain)?;
         let (mut P, mut dx) = (vec![0.0; self.P.len()], vec![0.0; self.x.len()]);
         let mut scratch = Scratch::default();
         let is_measured = |item: usize| z[item * m..(item + 1) * m].iter().any(|z| !z.is_nan());
@@ -95,7 +97,9 @@ impl GaussianState {
         failures.check()?;
         let mut x = vec![0.0; self.x.len()];
         manifold.state_add(&self.x, &dx, &mut x)?;
-        failures.add_infinite("state_add", &mut x)?;
+        let mut plain = vec![0.0; x.len()];
+        Vectors.state_add(&self.x, &dx, &mut plain)?;
+        failures.add_out_of_range("state_add", &mut x, &plain)?;
         self.finish(&x, &mut P, failures, is_measured)
     }
 

@@ -48,6 +48,16 @@ pub fn checkpoint() {
     }
 }
 
+/// The [`checkpoint`] of this thread's work, for its tasks on other threads.
+pub(crate) fn shared_checkpoint() -> impl Fn() + Send + Sync {
+    let interrupt = current();
+    move || {
+        if interrupt.as_ref().is_some_and(|i| i.0.load(Ordering::Relaxed)) {
+            resume_unwind(Box::new(Stopped));
+        }
+    }
+}
+
 /// The interrupt of this thread's work, for threads that share it.
 pub(super) fn current() -> Option<Interrupt> {
     CURRENT.with_borrow(Clone::clone)
@@ -92,6 +102,22 @@ mod tests {
             threads.install(|| for_each_band(&mut rows, 1, |_, _, band| band.fill(1)));
             assert!(rows.iter().all(|&value| value == 1));
         }
+    }
+
+    #[test]
+    fn tasks_on_other_threads_stop_with_the_work() {
+        let interrupt = Interrupt::default();
+        let result = interrupt.watch(|| {
+            let checkpoint = shared_checkpoint();
+            std::thread::scope(|scope| {
+                let watched = || catch_unwind(AssertUnwindSafe(&checkpoint)).is_err();
+                assert!(!scope.spawn(watched).join().unwrap());
+                interrupt.request();
+                assert!(scope.spawn(watched).join().unwrap());
+            });
+            checkpoint();
+        });
+        assert!(matches!(result, Err(Error::Interrupted)));
     }
 
     #[test]

@@ -1,6 +1,10 @@
 //! The regions as a forest of pixels, merged edge by edge.
 
 use super::{edges::Edge, edges::EdgeWeight, edges::second_offsets};
+use crate::parallel::checkpoint;
+
+/// Edges between two looks for a request to stop.
+const EDGES_PER_CHECKPOINT: usize = 1 << 16;
 
 /// Disjoint regions of pixels; each region is a tree, its root carries the region's size and threshold.
 #[derive(Debug)]
@@ -66,7 +70,10 @@ impl<T: EdgeWeight> Forest<T> {
         let infinite = T::from_f64(f64::INFINITY).key();
         let (finite, without_weight) = edges.split_at(edges.partition_point(|edge| edge.key < infinite));
         let mut rejected = Vec::new();
-        for edge in finite {
+        for (k, edge) in finite.iter().enumerate() {
+            if k % EDGES_PER_CHECKPOINT == 0 {
+                checkpoint();
+            }
             let (a, b) = self.roots(edge.code);
             if a == b {
                 continue;
@@ -85,7 +92,10 @@ impl<T: EdgeWeight> Forest<T> {
 
     /// Merges along `codes` where one of the two regions has fewer than `min_size` pixels.
     pub(super) fn merge_small(&mut self, codes: &[u32], min_size: usize) {
-        for &code in codes {
+        for (k, &code) in codes.iter().enumerate() {
+            if k % EDGES_PER_CHECKPOINT == 0 {
+                checkpoint();
+            }
             let (a, b) = self.roots(code);
             if a != b && (self.size[a as usize].min(self.size[b as usize]) as usize) < min_size {
                 self.unite(a, b);

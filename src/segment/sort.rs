@@ -1,6 +1,7 @@
 //! Stable sorting of edges by weight: least significant digit first.
 
 use super::{edges::Edge, edges::EdgeKey};
+use crate::parallel::checkpoint;
 
 /// Bits of a digit: the counters of 2^11 digits stay in the first-level cache.
 const DIGIT_BITS: u32 = 11;
@@ -17,6 +18,7 @@ pub(super) fn sort_by_weight<K: EdgeKey>(edges: &mut Vec<Edge<K>>) {
     }
     let mut sorted = vec![Edge::default(); edges.len()];
     for (pass, counts) in counts.iter_mut().enumerate() {
+        checkpoint();
         // All edges share this digit: nothing to do.
         if counts.iter().any(|&count| count as usize == edges.len()) {
             continue;

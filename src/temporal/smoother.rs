@@ -17,7 +17,7 @@
 use super::FlowFilter;
 use super::flow_filter::PAIRS;
 use crate::error::Result;
-use crate::parallel::checkpoint;
+use crate::parallel::{checkpoint, shared_checkpoint};
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, MOTION_NAMES, Status};
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};
@@ -54,14 +54,17 @@ pub(super) fn smooth<T: SimdReal>(filter: &FlowFilter<T>, frames: &[Frame<T>]) -
     for (t, frame) in frames.iter().enumerate().rev() {
         checkpoint();
         back.push(frame)?;
-        let known = Known::new(&back, frames.len() - t);
+        let (known, stop) = (Known::new(&back, frames.len() - t), shared_checkpoint());
         threads.install(|| {
             update_beyond(&mut beyond, &fields[t], (sites, &states[t]));
             let joined: Vec<_> = states[t]
                 .par_iter()
                 .zip(motions(&back))
                 .zip(&beyond)
-                .map(|((ahead, back), beyond)| with(known.join(ahead, &back), beyond))
+                .map(|((ahead, back), beyond)| {
+                    stop();
+                    with(known.join(ahead, &back), beyond)
+                })
                 .collect();
             write(&mut fields[t], sites.iter().zip(&seen).zip(&joined));
         });
@@ -81,7 +84,9 @@ pub(super) fn bytes<T>(filter: &FlowFilter<T>, frames: usize) -> Option<usize> {
 type Site<T> = [T; NUMBERS];
 
 fn motions<T: SimdReal>(filter: &FlowFilter<T>) -> Vec<Site<T>> {
+    let checkpoint = shared_checkpoint();
     let site = |index: usize| {
+        checkpoint();
         let (mean, covariance) = filter.store.state(index);
         std::array::from_fn(|k| match k {
             0..6 => T::from_f64(mean[MOTION + k]),
@@ -153,7 +158,9 @@ fn update_beyond<T: SimdReal>(
 ) {
     let Some(planes) = &field.covariance else { return };
     let (n, units) = (field.len(), MOTION_NAMES.map(|name| field.layout.units.scale(name)));
+    let checkpoint = shared_checkpoint();
     beyond.par_iter_mut().zip(sites).zip(states).for_each(|((beyond, &site), state)| {
+        checkpoint();
         if field.status[site] == Status::NonFinite {
             return;
         }

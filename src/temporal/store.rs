@@ -5,6 +5,7 @@ use super::kernel::{BLOCK, Constants, N, PACKED, PLANES, SCALE, order, packed, p
 use super::options::FlowFilterOptions;
 use crate::error::Result;
 use crate::jet::Reach;
+use crate::parallel::checkpoint;
 use crate::simd::SimdReal;
 use crate::types::Status;
 
@@ -36,6 +37,7 @@ impl<T: SimdReal> Store<T> {
         let (mut pixels, mut sites) = (Vec::new(), Vec::new());
         let mut fixed = Vec::with_capacity(width * height);
         for row in 0..height {
+            checkpoint();
             for col in 0..width {
                 let (x, y) = options.sites.pixel(col, row);
                 let masked = |(ex, ey): &(i32, i32)| {
@@ -60,6 +62,7 @@ impl<T: SimdReal> Store<T> {
         }
         let mut blocks = vec![T::from_f64(0.0); pixels.len() / BLOCK * PLANES * BLOCK];
         for block in blocks.chunks_exact_mut(PLANES * BLOCK) {
+            checkpoint();
             for k in 0..N {
                 block[k * BLOCK..(k + 1) * BLOCK].fill(constants.start.0[k]);
                 let deviation = constants.start.1[order(constants.motion_first)[k]].to_f64().sqrt();

@@ -101,6 +101,22 @@ def test_options_that_cannot_be_used(options, error, message):
         jacoflow.estimate(GOOD, **grouped(**options))
 
 
+def test_messages_say_where_an_argument_belongs():
+    flow, estimate = jacoflow.flow, jacoflow.estimate
+    for call in (lambda: estimate(GOOD, "windowed"), lambda: flow(*GOOD[:2], "windowed"), lambda: flow(*GOOD, "windowed")):
+        with pytest.raises(TypeError, match='^method: expected as a keyword, method="windowed", got '):
+            call()
+    for preset in ("fast", "balanced", "accurate"):
+        with pytest.raises(ValueError, match=rf'^method: expected a method or CoarseToFine\(preset="{preset}"\), got '):
+            flow(*GOOD[:2], method=preset)
+    moving = r"^mask: expected shape \(H, W\), got \(3, 8, 10\); .* masked arrays, numpy.ma.array\(frames, mask=hidden\)"
+    with pytest.raises(ValueError, match=moving):
+        estimate(GOOD, mask=np.ones(GOOD.shape, bool))
+    for call in (lambda: FlowFilter(precision="float16"), lambda: estimate(GOOD, precision="float16")):
+        with pytest.raises(ValueError, match='^precision: expected "float32" or "float64", got "float16"$'):
+            call()
+
+
 @pytest.mark.parametrize("progress", ["yes", 3])
 def test_progress_of_a_wrong_kind(progress):
     with pytest.raises(TypeError, match="progress: expected None, True or a function"):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from jacoflow import NumericalError
+from jacoflow import NumericalError, scenes
 from jacoflow.filters import (
     ExtendedKalmanFilter,
     KalmanFilter,
@@ -355,6 +355,57 @@ def test_a_state_that_fails_is_marked_and_the_others_go_on():
     alone.P, alone.R = 0.0, 0.0
     with pytest.raises(NumericalError, match="S of state 0 is not positive definite"):
         alone.update(1.0)
+
+
+def test_a_step_out_of_the_range_of_numbers_is_no_fault_of_a_function():
+    largest = 1.7e308
+
+    def limit(R, x=0.0):
+        ours = KalmanFilter(2, 1, batch=2)
+        ours.P, ours.Q, ours.H, ours.R = 0.0, 0.01, [[1.0, 0.0]], R
+        ours.x = [[x, 0.0], [0.0, 0.0]]
+        ours.predict()
+        return ours
+
+    for ours, z in ((limit(1e-300), [[largest], [1.0]]), (limit(1.0, -largest), [[largest], [1.0]])):
+        ours.update(z)
+        assert_array_equal(ours.failed, [True, False])
+        with pytest.raises(NumericalError, match="state 0 has outgrown the range of numbers"):
+            ours.x = np.tile(ours.x[0], (2, 1))
+            ours.update(np.tile(z[0], (2, 1)))
+    alone = KalmanFilter(2, 1)
+    alone.H, alone.state_add = [[1.0, 0.0]], lambda x, dx: x + np.inf
+    with pytest.raises(ValueError, match="^state_add: expected a function with finite results, got inf"):
+        alone.update(1.0)
+
+
+def test_smoothers_take_any_iterables():
+    ours = KalmanFilter(2, 1)
+    ours.H = [[1.0, 0.0]]
+    means, covariances, _, _ = ours.batch_filter(z for z in ([1.0], [2.0], [3.0]))
+    listed = ours.rts_smoother(means, covariances)
+    for found, expected in zip(ours.rts_smoother(iter(means), (P for P in covariances)), listed, strict=True):
+        assert_array_equal(found, expected)
+    with pytest.raises(TypeError, match="^Xs: expected real numbers, got set"):
+        ours.rts_smoother({1.0}, covariances)
+
+
+def test_numbers_beyond_doubles_are_shown():
+    ours = KalmanFilter(2, 1)
+    with pytest.raises(ValueError, match="^z: expected numbers up to 1.8e308, got 1000"):
+        ours.update(10**400)
+    with pytest.raises(TypeError, match="^z: expected real numbers, got dict"):
+        ours.update({})
+
+
+@pytest.mark.parametrize(("value", "shown"), [(2**70, str(2**70)), (10**30, "1e30"), (10**400, "one above 2.127"), (-(2**70), str(-(2**70)))])
+def test_integers_beyond_64_bits_are_shown(value, shown):
+    for call, name in (
+        (lambda: KalmanFilter(value, 1), "dim_x"),
+        (lambda: scenes.Scene("turbulence", width=value), "width"),
+    ):
+        with pytest.raises(ValueError, match=rf"^{name}: expected a positive integer.*, got {shown}$"):
+            call()
 
 
 @pytest.mark.parametrize("value", [-1, 10**30, -(10**30)])

@@ -82,6 +82,22 @@ def test_an_estimate_stops_and_its_estimator_begins_anew():
     """)
 
 
+def test_a_flow_filter_that_was_stopped_begins_anew():
+    run("""
+        flow_filter = jacoflow.FlowFilter(profile="patent")
+        assert stopped(lambda: [flow_filter.push(texture) for _ in range(1000)])
+        assert flow_filter.frames_pushed == 0 and flow_filter.state is None
+        fresh = jacoflow.FlowFilter(profile="patent")
+        for k in range(3):
+            frame = texture[:40, k : k + 50]
+            np.testing.assert_array_equal(flow_filter.push(frame).flow, fresh.push(frame).flow)
+        assert stopped(lambda: flow_filter.smooth(np.tile(texture, (3, 1, 1))))
+        assert flow_filter.frames_pushed == 3
+        assert stopped(lambda: [jacoflow.segment.felzenszwalb(texture) for _ in range(1000)])
+        assert stopped(lambda: [jacoflow.flow(texture, texture, texture, method="instantaneous") for _ in range(1000)])
+    """)
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
 def test_pipes_that_nobody_writes_to_are_left(tmp_path):
     names = {"io.frames": "frames.y4m", "jacoflow.FlowField.load": "field.pfm", "io.read_image": "image.pfm", "io.read_disparity": "disparity.pfm"}

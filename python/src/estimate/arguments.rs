@@ -4,6 +4,7 @@ use crate::errors::Outcome;
 use crate::frame_list::Noted;
 use crate::options::{self, Group, Integer, Object, PreprocessOptions};
 use crate::{arrays, image::renamed, io::flow_image, keywords::keep_options, keywords::with_common};
+use jacoflow::error::Error;
 use jacoflow::flow::{Estimator, EstimatorOptions, InitialFlow, METHODS, Method, MethodInfo, MethodSettings, PAIR};
 use jacoflow::temporal::{AnyFlowStream, RecursiveOptions, StreamPlan};
 use pyo3::prelude::*;
@@ -84,6 +85,10 @@ impl Arguments {
     /// The method and its options, before any check.
     pub fn settings(&self, py: Python<'_>) -> Outcome<MethodSettings> {
         if let Some(method) = options::word(py, &self.method) {
+            if METHODS.iter().flat_map(|method| method.presets).any(|preset| preset.name() == method) {
+                let expected = format!("a method or CoarseToFine(preset={method:?})");
+                return Err(Error::argument("method", expected, format!("the preset {method:?}")).into());
+            }
             return Ok(MethodSettings { method, ..MethodSettings::default() });
         }
         let group = Group::new(py, "method", &METHOD_CLASSES, &self.method)?;

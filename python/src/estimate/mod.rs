@@ -236,6 +236,7 @@ macro_rules! define_estimate {
             progress: Option<&Bound<'_, PyAny>>,
         ) -> Outcome<FlowField> {
             if !more.is_empty() {
+                refuse_positional_method(more.iter())?;
                 let got = format!("frames: expected one stack or list of frames, got {} arguments; for one field \
                     from two or three frames call jacoflow.flow(a, b) or jacoflow.flow(a, b, c)", more.len() + 1);
                 return Err(PyTypeError::new_err(got).into());
@@ -270,6 +271,7 @@ macro_rules! define_estimate {
             more: &Bound<'_, PyTuple>,
             $(#[pyo3(from_py_with = named::$option)] $option: $taken,)*
         ) -> Outcome<FlowField> {
+            refuse_positional_method([second, third].into_iter().flatten().cloned().chain(more.iter()))?;
             if second.is_none() || !more.is_empty() {
                 let got = 1 + [second, third].into_iter().flatten().count() + more.len();
                 let got = if got == 1 { "one argument".into() } else { format!("{got} arguments") };
@@ -282,6 +284,17 @@ macro_rules! define_estimate {
     };
 }
 estimator_options!(define_estimate []);
+
+/// Refuses a method among the frames, by the keyword that it needs.
+fn refuse_positional_method<'py>(arguments: impl Iterator<Item = Bound<'py, PyAny>>) -> Outcome<()> {
+    for argument in arguments {
+        if let Ok(word) = argument.extract::<String>() {
+            let got = format!("method: expected as a keyword, method={word:?}, got {word:?} among the frames");
+            return Err(PyTypeError::new_err(got).into());
+        }
+    }
+    Ok(())
+}
 
 /// Which fields of a sequence are wanted.
 struct Kind {

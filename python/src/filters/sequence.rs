@@ -7,6 +7,7 @@ use jacoflow::error::{Error, check_memory, shape_text};
 use jacoflow::filter::Smoothed;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
+use pyo3::types::PyList;
 
 /// An argument for each time.
 type Items<'py> = Vec<Option<Bound<'py, PyAny>>>;
@@ -73,8 +74,10 @@ pub fn filtered(
     Xs: &Bound<'_, PyAny>,
     Ps: &Bound<'_, PyAny>,
 ) -> Outcome<(usize, Vec<f64>, Vec<f64>)> {
-    let read = |name, index, value, times: Option<usize>| -> Outcome<(usize, Vec<f64>)> {
-        let (shape, values) = arrays::doubles(name, value)?;
+    let read = |name, index, value: &Bound<'_, PyAny>, times: Option<usize>| -> Outcome<(usize, Vec<f64>)> {
+        let listed =
+            if value.hasattr("__next__")? { Some(PyList::new(value.py(), items(name, value)?)?) } else { None };
+        let (shape, values) = arrays::doubles(name, listed.as_ref().map_or(value, |list| list.as_any()))?;
         let one = filter.shape(index);
         match shape.split_first() {
             Some((&count, tail)) if tail == one && count > 0 && times.is_none_or(|times| times == count) => {

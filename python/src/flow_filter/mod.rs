@@ -42,12 +42,21 @@ impl FlowFilter {
     /// Where a neighbourhood holds NaN or a masked pixel the filter only predicts, and the result is NaN with
     /// status NON_FINITE. Where the frame contradicts the prediction (black, flashed, dropped) the motion is
     /// that of the frames before, with status PREDICTED. ValueError for a frame of another size, TypeError
-    /// for another dtype; the filter is then unchanged.
+    /// for another dtype; the filter is then unchanged. Ctrl-C stops the work and forgets every frame.
     fn push(slf: &Bound<'_, Self>, frame: &Bound<'_, PyAny>) -> Outcome<FlowField> {
         let (py, mut this) = (slf.py(), alone(slf)?);
         let (frame, dtype) = arrays::typed_frame("frame", frame, this.colour)?;
-        let filter = &mut this.filter;
-        Ok(FlowField::any(py.detach(|| filter.push(&frame, dtype)).map_err(named)?))
+        let (filter, mut completed) = (&mut this.filter, false);
+        let field = interruptible(py, || {
+            let field = filter.push(&frame, dtype).map_err(named);
+            completed = true;
+            field
+        });
+        if !completed {
+            // Stopped by Ctrl-C in the middle of a frame.
+            this.filter.reset();
+        }
+        Ok(FlowField::any(field?))
     }
 
     /// The fields of all `frames` (T, H, W), a stack of T, each from the frames before and after it.

@@ -35,7 +35,7 @@ impl Options<'_> {
         let methods = [("auto", Method::Auto), ("ml", Method::MaximumLikelihood), ("efficient", Method::Efficient)];
         let smoothers = [("auto", Smoother::Auto), ("prior", Smoother::Prior), ("neighbours", Smoother::Neighbours)];
         let weights = self.weight_inv_depth.as_ref().map(|given| arrays::doubles("weight_inv_depth", given));
-        let wrong_random_state = |_| Error::argument("random_state", "an integer of at least 0", self.random_state.0);
+        let wrong_random_state = |_| Error::argument("random_state", "an integer of at least 0", self.random_state);
         Ok(MotionOptions {
             method: word("method", &self.method, &methods)?,
             robust: self.robust,

@@ -31,6 +31,7 @@ mod uncertainty;
 use super::{model::ModelKind, options::EstimatorOptions, options::RankPolicy, site::bands};
 use crate::error::Result;
 use crate::jet::{JetRows, JetStencil, Neighbourhood, TimeScheme};
+use crate::parallel::shared_checkpoint;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, Rect, SamplingGrid};
 use dense::Source;
@@ -102,10 +103,11 @@ impl Instantaneous {
             }
             _ => None,
         };
-        let all = bands(field);
+        let (all, checkpoint) = (bands(field), shared_checkpoint());
         common.threads.install(|| {
             // One band a task: with larger shares one thread would wait for the other.
             all.into_par_iter().with_max_len(1).for_each(|mut band| {
+                checkpoint();
                 if let Some(plan) = &rows {
                     return job.rows(&mut band, width, plan);
                 }

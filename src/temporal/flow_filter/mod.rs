@@ -9,7 +9,7 @@ use super::options::FlowFilterOptions;
 use super::store::Store;
 use crate::error::{Error, Result};
 use crate::jet::JetStencil;
-use crate::parallel::Threads;
+use crate::parallel::{Threads, checkpoint, shared_checkpoint};
 use crate::simd::{Level, SimdReal};
 use crate::types::{FieldLayout, FlowField, Frame, Interval, MOTION_NAMES, Status};
 pub(super) use pass::PAIRS;
@@ -122,7 +122,8 @@ impl<T: SimdReal> FlowFilter<T> {
     /// neighbourhood, the systematic error of such fits.
     ///
     /// # Errors
-    /// [`Error::Argument`] for a frame of another size; the filter is then unchanged.
+    /// [`Error::Argument`] for a frame of another size; the filter is then unchanged. One whose push was
+    /// interrupted is half changed.
     pub fn push(&mut self, frame: &Frame<T>) -> Result<FlowField<T>> {
         if frame.size() != self.frame_size {
             let text = |(w, h): (usize, usize)| format!("{w} x {h}");
@@ -138,6 +139,7 @@ impl<T: SimdReal> FlowFilter<T> {
         let mut results = vec![T::from_f64(0.0); filters * rows.count];
         let threads = self.options.threads;
         threads.install(|| pass::run(self, frame, &mut marks, &mut results))?;
+        checkpoint();
         self.frames += 1;
         let live = self.store.sites.len();
         self.repairs += marks.iter().flat_map(|m| m.events).take(live).map(|e| u64::from(e & REPAIRED)).sum::<u64>();
@@ -178,7 +180,9 @@ impl<T: SimdReal> FlowFilter<T> {
         if n == 0 {
             return Ok(field);
         }
+        let checkpoint = shared_checkpoint();
         let fill = |plane: &mut [T], row: usize, unit: f64| {
+            checkpoint();
             let unit = T::from_f64(unit);
             let blocks = results.chunks_exact(rows.count * BLOCK);
             for ((block, mark), sites) in blocks.zip(marks).zip(self.store.sites.chunks(BLOCK)) {

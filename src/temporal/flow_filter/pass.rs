@@ -2,6 +2,7 @@
 
 use super::FlowFilter;
 use crate::error::{Error, Result};
+use crate::parallel::shared_checkpoint;
 use crate::simd::{Level, SimdReal, dispatch};
 use crate::temporal::kernel::predict::{AUGMENTED, EXTENDED, FAST, NON_AUGMENTED, Predict};
 use crate::temporal::kernel::transition::{Exact, Rk4, Step};
@@ -64,7 +65,7 @@ fn double_precision(filter: &mut FlowFilter<f64>, frame: &Frame<f64>, marks: &mu
 
 /// Every block through its three passes; results are copied out while in the cache.
 fn every_block<T: SimdReal>(filter: &mut FlowFilter<T>, frame: &Frame<T>, marks: &mut [Mark], results: &mut [T]) {
-    let rows = filter.rows();
+    let (rows, checkpoint) = (filter.rows(), shared_checkpoint());
     let FlowFilter { options, store, constants, decorrelation, fit, .. } = filter;
     let level = options.simd.unwrap_or_else(Level::detect);
     let pass = Pass {
@@ -85,6 +86,7 @@ fn every_block<T: SimdReal>(filter: &mut FlowFilter<T>, frame: &Frame<T>, marks:
     let marks = marks.par_chunks_mut(TASK_BLOCKS);
     let results = results.par_chunks_mut(rows.count * BLOCK * TASK_BLOCKS);
     states.zip(pixels).zip(marks).zip(results).for_each(|(((states, pixels), marks), results)| {
+        checkpoint();
         let states = states.chunks_mut(PLANES * BLOCK * PASS_BLOCKS);
         let pixels = pixels.chunks(BLOCK * PASS_BLOCKS);
         let marks = marks.chunks_mut(PASS_BLOCKS);

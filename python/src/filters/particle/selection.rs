@@ -57,8 +57,8 @@ pub fn resample<'py>(
 }
 
 /// `random_state`: an integer that is not negative.
-pub(super) fn seed(Integer(value): Integer) -> Outcome<u64> {
-    u64::try_from(value).map_err(|_| Error::argument("random_state", "an integer of at least 0", value).into())
+pub(super) fn seed(value: Integer) -> Outcome<u64> {
+    u64::try_from(value.0).map_err(|_| Error::argument("random_state", "an integer of at least 0", value).into())
 }
 
 fn checked_weights(object: &Bound<'_, PyAny>) -> Outcome<Vec<f64>> {
