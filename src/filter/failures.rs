@@ -38,9 +38,9 @@ impl Failures {
         self.check()
     }
 
-    /// As [`add_infinite`](Self::add_infinite), for a function in place of vector arithmetic. A state for which
-    /// `plain`, the result of that arithmetic, is not finite either has left the range of numbers: its function
-    /// is not at fault.
+    /// As [`add_infinite`](Self::add_infinite), for a function in place of vector arithmetic. A state for
+    /// which `plain`, the result of that arithmetic, is not finite either has left the range of numbers: its
+    /// function is not at fault.
     ///
     /// # Errors
     /// [`Error::Numerical`] too when no state is left.

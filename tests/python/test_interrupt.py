@@ -37,7 +37,7 @@ ENDLESS = {
     "mixture": "mixture.VariationalGaussianMixture(8, max_iter=10**9, tol=None).fit(points)",
     "starts of a mixture": "mixture.VariationalGaussianMixture(4, max_iter=2, n_init=10**9).fit(points)",
     "Dirichlet mixture": "mixture.DirichletProcessGaussianMixture(8, max_iter=10**9, tol=None).fit(points)",
-    "frames of a scene": "jacoflow.scenes.Scene('turbulence', width=64, height=64).frame(1e6)",
+    "frames of a scene": "jacoflow.scenes.Scene('turbulence', width=640, height=480).frame(2e4)",
 }
 
 
