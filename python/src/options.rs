@@ -187,9 +187,14 @@ impl Display for Integer {
 }
 
 impl Integer {
+    /// At most 2^63 - 1: for counts of which all larger ones mean the same.
+    pub fn saturated(self) -> Self {
+        Self(self.0.min(i64::MAX.into()))
+    }
+
     /// The nearest unsigned number of 64 bits below 2^63; `None` below 0.
     pub fn clamped(self) -> Option<usize> {
-        usize::try_from(self.0.min(i64::MAX.into())).ok()
+        usize::try_from(self.saturated().0).ok()
     }
 }
 
@@ -209,8 +214,7 @@ pub fn natural(name: &'static str, value: Integer) -> Outcome<usize> {
 /// `threads`: a positive number, or all.
 pub fn threads(value: Option<Integer>) -> Outcome<Threads> {
     // More than there are processors for is no mistake.
-    let most = |Integer(n)| Integer(i128::min(n, i64::MAX.into()));
-    Ok(Threads::new(value.map(|n| count("threads", most(n))).transpose()?)?)
+    Ok(Threads::new(value.map(|n| count("threads", n.saturated())).transpose()?)?)
 }
 
 /// `simd`: the name of an instruction set that the processor has.

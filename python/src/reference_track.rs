@@ -32,7 +32,7 @@ pub fn tracker(
 ) -> Outcome<PyGradientTracker> {
     let options = ReferenceOptions {
         method: word("method", method, &[("local", Method::Local), ("paper", Method::Paper)])?,
-        search_window: search_window.map(|side| count("search_window", side)).transpose()?,
+        search_window: search_window.map(|side| count("search_window", side.saturated())).transpose()?,
         control: word("control", control, &[("integer", Control::Integer), ("subpixel", Control::Subpixel)])?,
         camera: camera_of(camera)?,
         order: order.map(|order| count("order", order)).transpose()?,

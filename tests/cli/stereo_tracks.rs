@@ -140,7 +140,7 @@ fn mistakes_about_tracks_of_views_are_named_and_leave_nothing() {
         ("left right --method stereo --search 65", &["search", "1 to 64"]),
         ("left.y4m --search 3", &["search", "stereo"]),
         ("left right --method stereo --graph g.svg", &["graph", ".png"]),
-        ("left right --method stereo --graph old.png", &["output", "--force"]),
+        ("left right --method stereo --graph old.png", &["graph", "--force"]),
         ("left right --method stereo --format mot", &["format", "one of csv, json"]),
         ("left right --method stereo -o t.txt", &["output", ".csv or .json"]),
         ("left right --method stereo -o old.csv", &["output", "--force"]),
