@@ -59,6 +59,8 @@ def main(seed, first, count, folder):
 
     made = os.path.join(folder, "made")
     os.makedirs(made, exist_ok=True)
+    # Some calls write to the current folder.
+    os.chdir(made)
     recipes, samples = calls.Recipes(made), files.Samples(folder)
     for case in range(first, first + count):
         rng = random.Random(f"{seed}/{case}")
