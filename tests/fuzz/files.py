@@ -16,7 +16,7 @@ import jacoflow
 from jacoflow import FlowField, FlowFilter, io, scenes, track
 
 FOREIGN = 1 / 16
-"""Share of the damaged pickles, graphs and tables that the command line is asked to describe."""
+"""Share of the damaged pickles, graphs and tables that the command line describes."""
 
 EDGES = [0, 1, 2, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF]
 WORDS = [b"0", b"-1", b"1", b"18446744073709551516", b"4294967296", b"9223372036854775807", b"nan", b"inf", b"1e308", b"-0.0", b"99999999999999999999"]

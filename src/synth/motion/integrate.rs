@@ -3,7 +3,7 @@
 use super::PointMap;
 use crate::parallel::checkpoint;
 
-/// Most steps along one path, a tenth of a second of work.
+/// Maximum number of steps along one path, so that no call runs for hours.
 const MAX_STEPS: f64 = 1e5;
 
 /// Longest duration of [`integrate`], frames.

@@ -14,7 +14,7 @@ type Site = [i32; 2];
 /// In place of a site where there is none.
 const NONE: Site = [i32::MIN; 2];
 
-/// Sets the `motion` of every site whose window is hardly usable, after a linearisation to `data`. Slopes are
+/// Sets the `motion` of every site with less than [`MIN_USABLE_SHARE`] of its window in `data`. Slopes are
 /// those of the mirrored site; where that has no data either, the flow is that of the edge without slopes.
 /// Returns whether there are such sites.
 pub(super) fn continue_motion<T: SimdReal>(data: &Planes<T>, motion: &mut Planes<T>) -> bool {
