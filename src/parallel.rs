@@ -1,13 +1,14 @@
 //! Threads: fixed row bands, so that results are bit-identical for any number of threads.
 
 mod interrupt;
+mod tasks;
 
 pub(crate) use interrupt::shared_checkpoint;
 pub use interrupt::{Interrupt, checkpoint};
+pub(crate) use tasks::{for_each, for_each_value, join, map, map_range, thread_count};
 
 use crate::error::{Error, Result};
 use interrupt::{current, under};
-use rayon::prelude::*;
 use std::ffi::OsString;
 use std::sync::atomic::{AtomicPtr, Ordering};
 use std::sync::{Arc, Mutex};
@@ -64,7 +65,7 @@ impl Threads {
             .map_or(processors, |requested| requested.min(MAX_PER_PROCESSOR * processors))
     }
 
-    /// Runs `work` where rayon's parallel iterators use exactly this many threads.
+    /// Runs `work`, whose tasks exactly this many threads share.
     pub fn install<R: Send>(self, work: impl FnOnce() -> R + Send) -> R {
         let (mut work, mut result) = (Some(work), None);
         install(self.count(), &mut || result = work.take().map(|work| work()));
@@ -176,7 +177,7 @@ pub(crate) fn for_each_band_of<T: Send>(
 /// Work on a band of rows: its number, the rows and their values.
 type BandWork<'a, T> = dyn Fn(usize, std::ops::Range<usize>, &mut [T]) + Sync + 'a;
 
-/// Behind a pointer for the same reason as [`install`].
+/// Behind a pointer, so that it is compiled once for each type of value.
 fn in_bands<T: Send>(band_rows: usize, buffer: &mut [T], row_len: usize, work: &BandWork<'_, T>) {
     if row_len == 0 {
         return;
@@ -189,13 +190,9 @@ fn in_bands<T: Send>(band_rows: usize, buffer: &mut [T], row_len: usize, work: &
             work(band, start..(start + band_rows).min(rows), slice);
         });
     };
-    let outside = rayon::current_thread_index().is_none();
-    if outside && buffer.len() <= MAX_SERIAL {
-        buffer.chunks_mut(band_rows * row_len).enumerate().for_each(one_band);
-        return;
-    }
-    let bands = buffer.par_chunks_mut(band_rows * row_len).enumerate();
-    if outside { Threads::default().install(|| bands.for_each(one_band)) } else { bands.for_each(one_band) }
+    let is_serial = tasks::is_outside() && buffer.len() <= MAX_SERIAL;
+    let bands = buffer.chunks_mut(band_rows * row_len).enumerate();
+    if is_serial { bands.for_each(one_band) } else { for_each(bands, one_band) }
 }
 
 /// Receives the progress of long work; may stop it.

@@ -361,6 +361,16 @@ fn the_argument_parser_stays_in_its_room() {
 }
 
 #[test]
+fn only_parallel_names_rayon() {
+    for file in rust_files() {
+        let name = name_of(&file);
+        let text = fs::read_to_string(&file).unwrap();
+        let is_door = name.starts_with("src/parallel");
+        assert!(is_door || !text.contains("rayon"), "{name} names rayon; call crate::parallel, which is compiled once");
+    }
+}
+
+#[test]
 fn the_reader_of_paths_sees_groups_and_wrong_arrows() {
     let found = paths("use crate::flow::x;\nuse crate::{io, synth::{a, b}, types};\nlet y = super::z::w();");
     let joined: Vec<String> = found.iter().map(|path| path.join("/")).collect();

@@ -5,10 +5,9 @@ use super::least_squares::{RANK_TOLERANCE, solve};
 use super::model::{Affine, MotionModel};
 use crate::error::{Error, Result};
 use crate::jet::{JetRates, JetStencil, Neighbourhood, TimeScheme};
-use crate::parallel::{BAND_ROWS, Threads};
+use crate::parallel::{self, BAND_ROWS, Threads};
 use crate::simd::SimdReal;
 use crate::types::Frame;
-use rayon::prelude::*;
 
 /// Why `[J(i); J(i')]` has full rank, or has not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
@@ -116,7 +115,7 @@ pub fn observability<T: SimdReal>(
     };
     let mut pixels = vec![None; width * height];
     threads.install(|| {
-        pixels.par_chunks_mut(BAND_ROWS * width).enumerate().for_each(|(band, chunk)| {
+        parallel::for_each(pixels.chunks_mut(BAND_ROWS * width).enumerate(), |(band, chunk)| {
             for (k, pixel) in chunk.iter_mut().enumerate() {
                 *pixel = at(k % width, band * BAND_ROWS + k / width);
             }

@@ -1,10 +1,9 @@
 //! Slopes of brightness: convolution with the derivatives of a Gaussian, by row bands.
 
 use super::{Border, blocks::cover, blocks::load, blocks::store};
-use crate::parallel::BAND_ROWS;
+use crate::parallel::{self, BAND_ROWS};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::Frame;
-use rayon::prelude::*;
 
 /// Weights of a Gaussian and of its derivative at distance 0, 1, ..., radius.
 #[derive(Debug, Clone)]
@@ -42,12 +41,11 @@ pub fn gaussian_gradient<T: SimdReal>(
         return (along_x, along_y);
     }
     let weights = Weights::new(sigma, radius);
-    let bands = along_x.data_mut().par_chunks_mut(BAND_ROWS * width);
-    bands.zip(along_y.data_mut().par_chunks_mut(BAND_ROWS * width)).enumerate().for_each(
-        |(band, (along_x, along_y))| {
-            dispatch(level, Band { frame, weights: &weights, first_row: band * BAND_ROWS, along_x, along_y });
-        },
-    );
+    let bands = along_x.data_mut().chunks_mut(BAND_ROWS * width);
+    let bands = bands.zip(along_y.data_mut().chunks_mut(BAND_ROWS * width)).enumerate();
+    parallel::for_each(bands, |(band, (along_x, along_y))| {
+        dispatch(level, Band { frame, weights: &weights, first_row: band * BAND_ROWS, along_x, along_y });
+    });
     (along_x, along_y)
 }
 

@@ -2,8 +2,9 @@
 
 use crate::error::{Error, Result};
 use crate::math::Real;
+use crate::parallel;
 use crate::types::Frame;
-use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Samples of a parallel task.
 const PART: usize = 1 << 16;
@@ -58,8 +59,16 @@ impl Quantiser {
 pub(crate) fn are_rounded<T: Real>(frames: &[&Frame<T>]) -> bool {
     const STEPS: f64 = 8.0;
     let range = |frame: &&Frame<T>| {
-        let both = |a: (f64, f64), b: (f64, f64)| Some((a.0.min(b.0), a.1.max(b.1)));
-        frame.data().par_chunks(PART).map(whole_range).try_reduce(|| (f64::INFINITY, f64::NEG_INFINITY), both)
+        // One part that holds a fraction decides.
+        let are_whole = AtomicBool::new(true);
+        let of_part = |part: &[T]| {
+            let range = are_whole.load(Ordering::Relaxed).then(|| whole_range(part)).flatten();
+            are_whole.fetch_and(range.is_some(), Ordering::Relaxed);
+            range
+        };
+        let both = |a: (f64, f64), b: Option<(f64, f64)>| b.map(|b| (a.0.min(b.0), a.1.max(b.1)));
+        let parts = parallel::map(frame.data().chunks(PART), of_part);
+        parts.into_iter().try_fold((f64::INFINITY, f64::NEG_INFINITY), both)
     };
     let ranges: Option<Vec<_>> = frames.iter().map(range).collect();
     ranges.is_some_and(|ranges| ranges.iter().any(|(least, most)| most - least >= STEPS))

@@ -2,10 +2,9 @@
 
 use super::{rows::JetRows, stencil::JetStencil};
 use crate::math::Real;
-use crate::parallel::{BAND_ROWS, Threads};
+use crate::parallel::{self, BAND_ROWS, Threads};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch, same, same_mut};
 use crate::types::Frame;
-use rayon::prelude::*;
 
 /// Six planes of the size of the frame: `I, Ix, Iy, Ixx, Ixy, Iyy`; NaN along the border.
 #[derive(Debug, Clone, PartialEq)]
@@ -106,7 +105,7 @@ fn planes_of<T: SimdReal>(
             .collect();
         let inside = stencil.reach().inside(frame.size());
         threads.install(|| {
-            bands.into_par_iter().for_each(|band| {
+            parallel::for_each(bands, |band| {
                 dispatch(level, BandKernel { rows, frame, inside: inside.clone(), band });
             });
         });

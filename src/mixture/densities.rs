@@ -3,7 +3,7 @@
 use super::{points::BAND, points::Points};
 use crate::error::{Error, Result};
 use crate::math::dense;
-use rayon::prelude::*;
+use crate::parallel;
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 /// Lower Cholesky factors of one matrix a component, and the logarithms of their determinants.
@@ -105,8 +105,8 @@ impl Densities {
         let components = self.components();
         let mut shares = vec![0.0; points.count() * components];
         let mut sums = vec![0.0; points.count()];
-        let bands = shares.par_chunks_mut(BAND * components).zip(sums.par_chunks_mut(BAND)).enumerate();
-        bands.for_each(|(band, (shares, sums))| {
+        let bands = shares.chunks_mut(BAND * components).zip(sums.chunks_mut(BAND)).enumerate();
+        parallel::for_each(bands, |(band, (shares, sums))| {
             for (n, (row, sum)) in shares.chunks_exact_mut(components).zip(sums).enumerate() {
                 *sum = self.share(points.at(band * BAND + n), row);
             }

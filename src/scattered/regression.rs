@@ -2,9 +2,9 @@
 
 use super::tree::Neighbours;
 use crate::math::tangents;
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use nalgebra::{Matrix2x3, Vector3};
-use rayon::prelude::*;
 
 /// Points of one task; a multiple of every lane count.
 const BAND: usize = 256;
@@ -148,8 +148,8 @@ pub(crate) fn regress(
     level: Level,
 ) -> Prediction {
     let mut out = Prediction { q: vec![0.0; queries.len()], c: vec![0.0; queries.len()] };
-    let bands = out.q.par_chunks_mut(BAND).zip(out.c.par_chunks_mut(BAND)).zip(queries.par_chunks(BAND));
-    bands.enumerate().for_each(|(band, ((q, c), queries))| {
+    let bands = out.q.chunks_mut(BAND).zip(out.c.chunks_mut(BAND)).zip(queries.chunks(BAND)).enumerate();
+    parallel::for_each(bands, |(band, ((q, c), queries))| {
         let first = band * BAND;
         dispatch(level, Regress { sites, queries, neighbours, first, k, spherical, q, c });
     });

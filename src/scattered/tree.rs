@@ -2,7 +2,7 @@
 //! tree, where neighbours are near each other in memory too. Which of several points at the same distance are
 //! kept depends on the points alone.
 
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Points of a leaf.
 const LEAF: usize = 12;
@@ -111,7 +111,7 @@ impl Tree {
     /// number of points.
     pub fn nearest(&self, queries: &[u32], k: usize) -> Neighbours {
         let mut places = vec![0u32; queries.len() * k];
-        places.par_chunks_mut(BAND * k).zip(queries.par_chunks(BAND)).for_each(|(out, queries)| {
+        parallel::for_each(places.chunks_mut(BAND * k).zip(queries.chunks(BAND)), |(out, queries)| {
             let mut found = Vec::with_capacity(6 * k + LEAF);
             for (out, &place) in out.chunks_exact_mut(k).zip(queries) {
                 self.search(place, k, &mut found);

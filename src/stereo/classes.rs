@@ -4,9 +4,9 @@
 //! have their window compared, 32 pixels of a row at a time.
 
 use super::{edges::EdgeMap, edges::NO_CLASS, options::EdgeDisparityOptions};
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
-use rayon::prelude::*;
 
 /// Pixels compared at a time; no window is wider.
 const LANES: usize = 32;
@@ -65,7 +65,7 @@ pub(super) fn match_classes(
     offsets.sort_by_key(|e| e.abs());
     let planes = (Padded::new(&left.class, radius, NOTHING_LEFT), Padded::new(&right.class, radius, NO_CLASS));
     let mut matches = vec![None; left.len().div_ceil(every)];
-    matches.par_chunks_mut(TASK).enumerate().for_each(|(task, out)| {
+    parallel::for_each(matches.chunks_mut(TASK).enumerate(), |(task, out)| {
         let first = task * TASK;
         dispatch(Level::detect(), Task { edges: left, planes: &planes, options, offsets: &offsets, first, every, out });
     });

@@ -5,10 +5,9 @@
 //! compared at a time, and sums are exact in any order.
 
 use super::edges::EdgeMap;
-use crate::parallel::for_each_band;
+use crate::parallel::{self, for_each_band};
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
-use rayon::prelude::*;
 
 /// Candidates compared at a time.
 pub(super) const CHUNK: usize = 16;
@@ -117,7 +116,7 @@ pub(super) fn costs(
 ) -> Vec<u16> {
     let padded = candidates.padded();
     let mut costs = vec![MAX_COST; edges.len() * padded];
-    costs.par_chunks_mut(TASK * padded).enumerate().for_each(|(task, out)| {
+    parallel::for_each(costs.chunks_mut(TASK * padded).enumerate(), |(task, out)| {
         for (i, out) in out.chunks_exact_mut(padded).enumerate() {
             let edge = task * TASK + i;
             let allowed = allowed(edge);

@@ -13,8 +13,8 @@ use super::semi_global::{Match, View};
 use crate::error::Result;
 use crate::image::{Border, GaussianSmoother, Interpolation};
 use crate::math::median;
+use crate::parallel;
 use crate::types::Frame;
-use rayon::prelude::*;
 
 /// Passes of disparity and vertical steps.
 const PASSES: usize = 2;
@@ -30,6 +30,8 @@ const SAMPLED: usize = 4;
 const WINDOWS: (usize, usize) = (30, 6000);
 /// Largest number of windows for monitoring.
 const MAX_MONITORED_WINDOWS: usize = 1000;
+/// Windows of one task.
+const WINDOWS_PER_TASK: usize = 64;
 /// Pixels on each side of the middle of a window.
 const RADIUS: usize = 4;
 /// Pixels of a window.
@@ -131,7 +133,7 @@ pub(super) fn misalignment(
 /// Both views, smoothed.
 fn smoothed(left: &Frame<f32>, right: &Frame<f32>) -> (Frame<f32>, Frame<f32>) {
     let smoother = GaussianSmoother { sigma: 1.0, truncate: 4.0, border: Border::Replicate };
-    rayon::join(|| smoother.apply(left), || smoother.apply(right))
+    parallel::join(|| smoother.apply(left), || smoother.apply(right))
 }
 
 /// The window round a matched edge pixel.
@@ -237,7 +239,8 @@ fn vertical_steps(windows: &mut [Window], right: &Frame<f32>, start: f64, steps:
 
 /// One step along y, rows, with each window's own along x. None without enough windows.
 fn vertical_step(windows: &mut [Window], aligned: &Frame<f32>) -> Option<f64> {
-    let misfits: Vec<Option<Misfit>> = windows.par_iter().map(|window| window.misfit(aligned)).collect();
+    let misfits: Vec<Option<Misfit>> =
+        parallel::map_range(windows.len(), WINDOWS_PER_TASK, |n| windows[n].misfit(aligned));
     let mut residuals: Vec<f64> = misfits.iter().flatten().map(|misfit| misfit.residual).collect();
     if residuals.len() < WINDOWS.0 {
         return None;

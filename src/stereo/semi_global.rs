@@ -5,10 +5,9 @@ use super::cost::{Candidates, Coded, MAX_COST, Side, costs};
 use super::edges::{EdgeMap, EdgeSettings};
 use super::options::EdgeDisparityOptions;
 use crate::image::gaussian_gradient;
-use crate::parallel::checkpoint;
+use crate::parallel::{self, checkpoint};
 use crate::simd::Level;
 use crate::types::Frame;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Largest cost of a match over the highest cost.
@@ -60,7 +59,7 @@ pub(super) fn match_views(left: &View, right: &View, options: &EdgeDisparityOpti
     let from_left = Candidates { first: -greatest, count };
     let from_right = Candidates { first: least, count };
     let reach = from_left.reach().max(from_right.reach());
-    let (own, other) = rayon::join(
+    let (own, other) = parallel::join(
         || Coded::new(&left.along_x, &left.along_y, Side::Left, reach),
         || Coded::new(&right.along_x, &right.along_y, Side::Right, reach),
     );
@@ -80,7 +79,7 @@ pub(super) fn match_views(left: &View, right: &View, options: &EdgeDisparityOpti
     let everywhere = |edge: usize| from_right.inside(right.edges.columns[edge], width);
     let find_right = || winners(&right.edges, [&other, &own], from_right, everywhere, place, |k| least as f32 + k);
     checkpoint();
-    let (mut matches, confirming) = rayon::join(find_left, find_right);
+    let (mut matches, confirming) = parallel::join(find_left, find_right);
     checkpoint();
     keep_confirmed(&left.edges, &mut matches, &right.edges, &confirming);
     matches
@@ -98,9 +97,9 @@ fn winners(
     let padded = candidates.padded();
     let costs = costs(edges, own, other, candidates, &allowed);
     let (above, below) =
-        rayon::join(|| sweep(edges, &costs, padded, From::Above), || sweep(edges, &costs, padded, From::Below));
+        parallel::join(|| sweep(edges, &costs, padded, From::Above), || sweep(edges, &costs, padded, From::Below));
     let mut matches = vec![None; edges.len()];
-    matches.par_chunks_mut(TASK).enumerate().for_each(|(task, out)| {
+    parallel::for_each(matches.chunks_mut(TASK).enumerate(), |(task, out)| {
         let mut sums = vec![0u16; padded];
         for (i, out) in out.iter_mut().enumerate() {
             let edge = task * TASK + i;

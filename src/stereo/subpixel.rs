@@ -7,9 +7,9 @@
 
 use super::{semi_global::Match, semi_global::View};
 use crate::image::{Border, GaussianSmoother, Interpolation};
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
-use rayon::prelude::*;
 
 /// Pixels on each side of the middle of the window.
 const RADIUS: usize = 4;
@@ -34,8 +34,8 @@ const TASK: usize = 256;
 pub(super) fn refine(left: &Frame<f32>, view: &View, right: &Frame<f32>, matches: &mut [Option<Match>]) {
     // The right view is smoothed as the slopes are, so that noise does not bias the steps.
     let smoother = GaussianSmoother { sigma: 1.0, truncate: 4.0, border: Border::Replicate };
-    let (left, right) = rayon::join(|| smoother.apply(left), || smoother.apply(right));
-    matches.par_chunks_mut(TASK).enumerate().for_each(|(task, matches)| {
+    let (left, right) = parallel::join(|| smoother.apply(left), || smoother.apply(right));
+    parallel::for_each(matches.chunks_mut(TASK).enumerate(), |(task, matches)| {
         dispatch(Level::detect(), Task { left: &left, view, right: &right, first: task * TASK, matches });
     });
 }

@@ -17,11 +17,10 @@
 use super::FlowFilter;
 use super::flow_filter::PAIRS;
 use crate::error::Result;
-use crate::parallel::{checkpoint, shared_checkpoint};
+use crate::parallel::{self, checkpoint, shared_checkpoint};
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, MOTION_NAMES, Status};
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};
-use rayon::prelude::*;
 
 /// Numbers of a site: motion, and the upper triangle of its covariance.
 const NUMBERS: usize = 6 + PAIRS.len();
@@ -29,6 +28,8 @@ const NUMBERS: usize = 6 + PAIRS.len();
 const ROUNDING: f64 = 1e-5;
 /// Index of `u` in a state.
 const MOTION: usize = 6;
+/// Sites of one task.
+const SITES_PER_TASK: usize = 64;
 
 /// The fields of `frames` by a smoother with the options of `filter`, which has seen no frame.
 ///
@@ -57,15 +58,11 @@ pub(super) fn smooth<T: SimdReal>(filter: &FlowFilter<T>, frames: &[Frame<T>]) -
         let (known, stop) = (Known::new(&back, frames.len() - t), shared_checkpoint());
         threads.install(|| {
             update_beyond(&mut beyond, &fields[t], (sites, &states[t]));
-            let joined: Vec<_> = states[t]
-                .par_iter()
-                .zip(motions(&back))
-                .zip(&beyond)
-                .map(|((ahead, back), beyond)| {
-                    stop();
-                    with(known.join(ahead, &back), beyond)
-                })
-                .collect();
+            let (ahead, back) = (&states[t], motions(&back));
+            let joined = parallel::map_range(sites.len(), SITES_PER_TASK, |n| {
+                stop();
+                with(known.join(&ahead[n], &back[n]), &beyond[n])
+            });
             write(&mut fields[t], sites.iter().zip(&seen).zip(&joined));
         });
     }
@@ -93,7 +90,7 @@ fn motions<T: SimdReal>(filter: &FlowFilter<T>) -> Vec<Site<T>> {
             _ => T::from_f64(covariance[MOTION + PAIRS[k - 6].0][MOTION + PAIRS[k - 6].1]),
         })
     };
-    (0..filter.store.sites.len()).into_par_iter().map(site).collect()
+    parallel::map_range(filter.store.sites.len(), SITES_PER_TASK, site)
 }
 
 fn parts<T: SimdReal>(site: &Site<T>) -> (Vector6<f64>, Matrix6<f64>) {
@@ -159,8 +156,9 @@ fn update_beyond<T: SimdReal>(
     let Some(planes) = &field.covariance else { return };
     let (n, units) = (field.len(), MOTION_NAMES.map(|name| field.layout.units.scale(name)));
     let checkpoint = shared_checkpoint();
-    beyond.par_iter_mut().zip(sites).zip(states).for_each(|((beyond, &site), state)| {
+    parallel::for_each_value(beyond, SITES_PER_TASK, |place, beyond| {
         checkpoint();
+        let (site, state) = (sites[place], &states[place]);
         if field.status[site] == Status::NonFinite {
             return;
         }

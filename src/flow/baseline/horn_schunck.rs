@@ -9,10 +9,9 @@ use crate::error::{Error, Result};
 use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{MaskCounts, bands};
 use crate::jet::Reach;
-use crate::parallel::checkpoint;
+use crate::parallel::{self, checkpoint};
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, Status};
-use rayon::prelude::*;
 
 /// The smoothness weight g of the energy `sum (Ix u + Iy v + It)^2 + g^2 (|grad u|^2 + |grad v|^2)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -219,7 +218,7 @@ impl System<'_> {
 
     /// `out = A f`.
     fn apply(&self, f: &Flow, out: &mut Flow) {
-        out.par_chunks_mut(BLOCK).enumerate().for_each(|(block, chunk)| {
+        parallel::for_each(out.chunks_mut(BLOCK).enumerate(), |(block, chunk)| {
             for (k, o) in chunk.iter_mut().enumerate() {
                 let i = block * BLOCK + k;
                 let [ix, iy, _] = self.data[i];
@@ -237,7 +236,7 @@ impl System<'_> {
 
     /// `out = B^-1 r`, B the 2x2 blocks of the diagonal.
     fn precondition(&self, r: &Flow, out: &mut Flow) {
-        out.par_chunks_mut(BLOCK).enumerate().for_each(|(block, chunk)| {
+        parallel::for_each(out.chunks_mut(BLOCK).enumerate(), |(block, chunk)| {
             for (k, o) in chunk.iter_mut().enumerate() {
                 let i = block * BLOCK + k;
                 let [ix, iy, _] = self.data[i];
@@ -273,7 +272,7 @@ impl System<'_> {
             let next = dot(&r, &z);
             let beta = next / rz;
             rz = next;
-            p.par_chunks_mut(BLOCK).zip(z.par_chunks(BLOCK)).for_each(|(p, z)| {
+            parallel::for_each(p.chunks_mut(BLOCK).zip(z.chunks(BLOCK)), |(p, z)| {
                 for (p, z) in p.iter_mut().zip(z) {
                     *p = [z[0] + beta * p[0], z[1] + beta * p[1]];
                 }
@@ -291,7 +290,7 @@ impl System<'_> {
 
 /// `f += alpha p`.
 fn step(f: &mut Flow, alpha: f64, p: &Flow) {
-    f.par_chunks_mut(BLOCK).zip(p.par_chunks(BLOCK)).for_each(|(f, p)| {
+    parallel::for_each(f.chunks_mut(BLOCK).zip(p.chunks(BLOCK)), |(f, p)| {
         for (f, p) in f.iter_mut().zip(p) {
             *f = [f[0] + alpha * p[0], f[1] + alpha * p[1]];
         }
@@ -300,10 +299,8 @@ fn step(f: &mut Flow, alpha: f64, p: &Flow) {
 
 /// Scalar product, by blocks in a fixed order.
 fn dot(a: &Flow, b: &Flow) -> f64 {
-    let parts: Vec<f64> = a
-        .par_chunks(BLOCK)
-        .zip(b.par_chunks(BLOCK))
-        .map(|(a, b)| a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1]).sum())
-        .collect();
+    let parts: Vec<f64> = parallel::map(a.chunks(BLOCK).zip(b.chunks(BLOCK)), |(a, b)| {
+        a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1]).sum()
+    });
     parts.iter().sum()
 }

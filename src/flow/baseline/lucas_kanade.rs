@@ -12,10 +12,9 @@ use crate::flow::site::{FieldBand, MaskCounts, bands};
 use crate::image::StructureTensor;
 use crate::jet::Reach;
 use crate::math::Real;
-use crate::parallel::Threads;
+use crate::parallel::{self, Threads};
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, Rect, SamplingGrid, Status};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// The weights of the window.
@@ -152,7 +151,7 @@ impl LucasKanade {
         let one = Threads::new(Some(1))?;
         let noise = common.noise.map(|sd| sd * sd * self.options.differences.first_gain());
         common.threads.install(|| {
-            bands(field).into_par_iter().try_for_each(|mut band| {
+            let results = parallel::map(bands(field), |mut band| {
                 let mut columns = Columns::default();
                 for index in band.sites.clone() {
                     let (col, row) = (index % width, index / width);
@@ -175,7 +174,8 @@ impl LucasKanade {
                     Self::solve::<T>(&mut band, local, &sums, brightness, noise);
                 }
                 Ok(())
-            })
+            });
+            results.into_iter().collect()
         })
     }
 

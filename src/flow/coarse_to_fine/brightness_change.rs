@@ -12,9 +12,9 @@
 use super::{brightness_scale::BrightnessScale, data_term::View, planes::Planes, planes::SITE_SPACING};
 use crate::ablation::keeps;
 use crate::math::robust_std;
+use crate::parallel;
 use crate::simd::{Level, SimdReal};
 use crate::types::{Frame, Mask};
-use rayon::prelude::*;
 
 /// Differences of whole frames that motion alone rarely makes: logarithm of the ratio of their standard
 /// deviations, and difference of their means over the standard deviation.
@@ -37,6 +37,8 @@ const HALF_WEIGHT_RESIDUAL: f64 = 2.0;
 const GAIN_BOUNDS: [f64; 2] = [0.1, 10.0];
 /// Minimum number of pixels, of a frame or of a measurement.
 const MIN_PIXELS: usize = 128;
+/// Sites of one task.
+const SITES_PER_TASK: usize = 1024;
 
 /// Index of the frame that the others are brought to: the one the field belongs to.
 fn reference(frames: usize) -> usize {
@@ -129,7 +131,7 @@ impl LightMap {
         if self.nodes.iter().all(|node| *node == [1.0, 0.0]) {
             return out;
         }
-        out.data_mut().par_chunks_mut(frame.width().max(1)).enumerate().for_each(|(y, row)| {
+        parallel::for_each(out.data_mut().chunks_mut(frame.width().max(1)).enumerate(), |(y, row)| {
             // Linear in x between two columns of nodes.
             for first in 0..self.columns.max(2) - 1 {
                 let pixel = |column: usize| ((column as f64 * self.pitch).ceil() as usize).min(row.len());
@@ -189,9 +191,9 @@ fn sample<T: SimdReal>(simd: Level, view: &View<'_, T>, motion: &Planes<T>) -> V
         out.iter()
             .zip(xs.iter().zip(&ys))
             .map(|(v, (x, y))| if usable(*x, *y) { v.to_f64() } else { f64::NAN })
-            .collect()
+            .collect::<Vec<f64>>()
     };
-    (0..motion.height).into_par_iter().map(row).collect::<Vec<Vec<f64>>>().concat()
+    parallel::map(0..motion.height, row).concat()
 }
 
 /// Gain and offset of the `other` brightness over the `known` one, on the sites; `None` if more than the
@@ -215,9 +217,9 @@ fn residual(map: &LightMap, width: usize, n: usize, (known, other): (f64, f64)) 
 }
 
 fn residual_std(map: &LightMap, width: usize, known: &[f64], other: &[f64]) -> Option<f64> {
-    let residuals = known.par_iter().zip(other).enumerate();
-    let residuals = residuals.map(|(n, (a, b))| residual(map, width, n, (*a, *b)).abs());
-    let mut residuals: Vec<f64> = residuals.filter(|residual| residual.is_finite()).collect();
+    let of_site = |n: usize| residual(map, width, n, (known[n], other[n])).abs();
+    let mut residuals = parallel::map_range(known.len(), SITES_PER_TASK, of_site);
+    residuals.retain(|residual| residual.is_finite());
     if residuals.len() < MIN_PIXELS { None } else { robust_std(&mut residuals) }
 }
 

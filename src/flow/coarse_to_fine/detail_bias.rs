@@ -23,8 +23,8 @@ use super::workspace::Workspace;
 use crate::ablation::keeps;
 use crate::image::Spline;
 use crate::math::median;
+use crate::parallel;
 use crate::simd::SimdReal;
-use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// Binomial means of the sums, so that windows have standard deviations of 3.4, 8.7 and 14.3 px.
@@ -35,6 +35,8 @@ const WINDOWS: [f64; 3] = [3.4, 8.7, 14.3];
 const PRIOR: f64 = 0.5;
 /// Maximum difference at a node, px: larger ones are of two motions.
 const MAX_DIFFERENCE: f64 = 0.1;
+/// Nodes of one task.
+const NODES_PER_TASK: usize = 128;
 /// Maximum components of a remainder, px.
 const MAX_REMAINDER: f64 = 1.0;
 /// The same, where the flow moves by it: larger ones are of two motions.
@@ -138,7 +140,7 @@ impl DetailBias {
         let (width, stride) = (motion.width, motion.stride());
         let (along, across) = self.axes;
         let columns: Vec<_> = (0..width).map(|x| along.around(x as f64 / SITES_PER_NODE as f64)).collect();
-        motion.data_mut().par_chunks_mut(len.max(1)).enumerate().for_each(|(y, row)| {
+        parallel::for_each(motion.data_mut().chunks_mut(len.max(1)).enumerate(), |(y, row)| {
             let (above, below, down) = across.around(y as f64 / SITES_PER_NODE as f64);
             for c in 0..2 {
                 let line = |j: usize| move |i: usize| self.correction[j * along.count + i][c];
@@ -189,13 +191,13 @@ fn node_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, size: (usize, us
         };
         (0..size.0).map(node).collect::<Vec<_>>()
     };
-    let rows: Vec<Vec<NodeSums>> = (0..data.height).into_par_iter().map(row).collect();
+    let rows: Vec<Vec<NodeSums>> = parallel::map(0..data.height, row);
     let nodes = |n: usize| {
         let mut sum = NodeSums::default();
         sites_around(n / size.0, data.height).for_each(|(y, weight)| add(&mut sum, weight, &rows[y][n % size.0]));
         sum
     };
-    (0..size.0 * size.1).into_par_iter().map(nodes).collect()
+    parallel::map_range(size.0 * size.1, NODES_PER_TASK, nodes)
 }
 
 /// Normal equations of the sites of a row for the flow that their motion, with its curvature, leaves.

@@ -2,9 +2,9 @@
 
 use super::{brightness_scale::BrightnessScale, data_term::View, options::MIN_LEVEL_SIDE};
 use crate::image::{Spline, fill_holes, halve_into, halve_mask};
+use crate::parallel;
 use crate::simd::{Level, SimdReal};
 use crate::types::{Frame, Mask};
-use rayon::prelude::*;
 
 const CHUNK: usize = 1 << 16;
 
@@ -141,8 +141,7 @@ fn scale<T: SimdReal>(from: &Frame<T>, brightness: BrightnessScale, to: &mut Fra
         *to = Frame::filled(from.width(), from.height(), T::from_f64(0.0));
     }
     let (mean, gain) = (T::from_f64(brightness.mean), T::from_f64(brightness.gain));
-    let bands = to.data_mut().par_chunks_mut(CHUNK).zip(from.data().par_chunks(CHUNK));
-    bands.for_each(|(to, from)| {
+    parallel::for_each(to.data_mut().chunks_mut(CHUNK).zip(from.data().chunks(CHUNK)), |(to, from)| {
         for (to, &value) in to.iter_mut().zip(from) {
             *to = (value - mean) * gain;
         }
@@ -153,7 +152,7 @@ fn scale<T: SimdReal>(from: &Frame<T>, brightness: BrightnessScale, to: &mut Fra
 fn holes<T: SimdReal>(frame: &Frame<T>, brightness: BrightnessScale, mask: Option<&Mask>) -> Option<Mask> {
     // Without a short circuit within a task, so that the compiler uses lanes.
     let all_hold = |part: &[T]| part.iter().fold(true, |so_far, value| so_far & brightness.holds(value.to_f64()));
-    if mask.is_none() && frame.data().par_chunks(CHUNK).all(all_hold) {
+    if mask.is_none() && parallel::map(frame.data().chunks(CHUNK), all_hold).into_iter().all(|all_hold| all_hold) {
         return None;
     }
     let usable = Frame::from_fn(frame.width(), frame.height(), |x, y| {

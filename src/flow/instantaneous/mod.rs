@@ -31,7 +31,7 @@ mod uncertainty;
 use super::{model::ModelKind, options::EstimatorOptions, options::RankPolicy, site::bands};
 use crate::error::Result;
 use crate::jet::{JetRows, JetStencil, Neighbourhood, TimeScheme};
-use crate::parallel::shared_checkpoint;
+use crate::parallel::{self, shared_checkpoint};
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, Rect, SamplingGrid};
 use dense::Source;
@@ -39,7 +39,6 @@ use job::{Job, RowPlan, SiteMask};
 use lane_noise::LaneNoise;
 use noise::NoiseModel;
 pub(super) use point::rounding_floor;
-use rayon::prelude::*;
 
 /// Options of the per-pixel estimate.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -105,8 +104,7 @@ impl Instantaneous {
         };
         let (all, checkpoint) = (bands(field), shared_checkpoint());
         common.threads.install(|| {
-            // One band a task: with larger shares one thread would wait for the other.
-            all.into_par_iter().with_max_len(1).for_each(|mut band| {
+            parallel::for_each(all, |mut band| {
                 checkpoint();
                 if let Some(plan) = &rows {
                     return job.rows(&mut band, width, plan);

@@ -2,9 +2,9 @@
 
 use super::{follow::follow, options::PointFlowOptions, pyramid::PointPyramid, window::Window};
 use crate::error::{Error, Result};
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
-use rayon::prelude::*;
 
 /// Points of one task. Fixed, though no result depends on it.
 const BATCH: usize = 32;
@@ -68,7 +68,8 @@ pub fn track_points(
         return Ok(flows);
     }
     let level = options.simd.unwrap_or_else(Level::detect);
-    flows.par_chunks_mut(BATCH).zip(points.par_chunks(BATCH)).enumerate().for_each(|(batch, (flows, points))| {
+    let batches = flows.chunks_mut(BATCH).zip(points.chunks(BATCH)).enumerate();
+    parallel::for_each(batches, |(batch, (flows, points))| {
         let guesses = guesses.map(|guesses| &guesses[batch * BATCH..][..points.len()]);
         dispatch(level, Batch { planes, points, guesses, options, flows });
     });

@@ -7,9 +7,9 @@ use super::tile::{GROUP_ROWS, Grid, JetTile, Planes, Source, TILE_COLUMNS, padde
 use crate::flow::RankPolicy;
 use crate::flow::symmetric::{ENTRIES, decompose, factor};
 use crate::image::lagrange_at;
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, SimdReal, dispatch};
 use crate::types::{Frame, Status};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Smallest share of a squared column that the others leave independent where its unknown is determined.
@@ -70,9 +70,10 @@ impl<T: SimdReal> Strip<T> {
         let mut grid = Grid::new(rows, columns.clone(), if setting.inverse { PLANES } else { INVERSE });
         let (mut rank, mut status) = (vec![0; n], vec![Status::Ok; n]);
         let sites = grid.task_rows() * columns.len();
-        let states = rank.par_chunks_mut(sites).zip(status.par_chunks_mut(sites));
-        grid.tasks().zip(states).for_each_init(Scratch::default, |scratch, ((rows, values), (rank, status))| {
-            Task { source, setting, scratch, rows, columns: columns.clone(), values, rank, status }.run();
+        let states = rank.chunks_mut(sites).zip(status.chunks_mut(sites));
+        parallel::for_each(grid.tasks().zip(states), |((rows, values), (rank, status))| {
+            let (scratch, columns) = (&mut Scratch::default(), columns.clone());
+            Task { source, setting, scratch, rows, columns, values, rank, status }.run();
         });
         Self { grid, rank, status, scale: setting.scale }
     }
@@ -100,8 +101,8 @@ impl<T: SimdReal> Strip<T> {
     pub fn carry(&self, frame: &Frame<T>, time: f64) -> Frame<T> {
         let mut out = frame.clone();
         let (columns, length) = (self.grid.columns.clone(), self.grid.columns.len());
-        let rows = out.data_mut().par_chunks_mut(frame.width()).enumerate();
-        rows.skip(self.grid.rows[0]).take(self.grid.rows.len()).for_each(|(y, out)| {
+        let rows = out.data_mut().chunks_mut(frame.width()).enumerate();
+        parallel::for_each(rows.skip(self.grid.rows[0]).take(self.grid.rows.len()), |(y, out)| {
             let mut motion = vec![T::default(); 6 * length];
             self.motion_row(columns.start as isize, y as isize, &mut motion);
             for (c, out) in out[columns.clone()].iter_mut().enumerate() {
@@ -118,7 +119,7 @@ impl<T: SimdReal> Strip<T> {
     }
 }
 
-/// Buffers of one thread.
+/// Buffers of one task.
 #[derive(Default)]
 struct Scratch<T> {
     jets: JetTile<T>,

@@ -13,10 +13,9 @@ use crate::flow::site::{FieldBand, bands};
 use crate::flow::symmetric::upper;
 use crate::image::{GaussianSmoother, are_rounded};
 use crate::jet::{JetRows, JetStencil};
-use crate::parallel::{BAND_ROWS, checkpoint};
+use crate::parallel::{self, BAND_ROWS, checkpoint};
 use crate::simd::{Lanes, Level, SimdReal};
 use crate::types::{FlowField, Frame, Mask, Rect, SamplingGrid, Status};
-use rayon::prelude::*;
 use std::borrow::Cow;
 use std::ops::Range;
 
@@ -73,7 +72,7 @@ impl Windowed {
                     let (x, y) = sites.pixel(0, first);
                     let height = span((rows - first).min(STRIP_ROWS));
                     let part = self.part(images, Rect { x, y, width: span(columns), height }, *stride);
-                    bands.par_iter_mut().for_each(|band| {
+                    parallel::for_each(bands, |band| {
                         for row in band.sites.start / columns..band.sites.end / columns {
                             let to = row * columns - band.sites.start;
                             part.write_run((sites.pixel(0, row), *stride), to..to + columns, band);
@@ -85,7 +84,7 @@ impl Windowed {
             SamplingGrid::Points(points) => {
                 // One window at a time while that is less work than everything around the points.
                 let each = (2 * self.margin(common) + 1).pow(2);
-                bands(field).into_par_iter().for_each(|mut band| {
+                parallel::for_each(bands(field), |mut band| {
                     let own = &points[band.sites.clone()];
                     let whole = bounds(own);
                     let size = if own.len() * each < whole.width * whole.height { 1 } else { own.len() };

@@ -24,8 +24,8 @@ use crate::flow::moment_filter::filter;
 use crate::flow::options::EstimatorOptions;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::jet::JetStencil;
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, SimdReal, dispatch};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Constants of the covariance.
@@ -78,15 +78,15 @@ impl<T: SimdReal> CovarianceSetting<T> {
     pub fn covariance(&self, source: &Source<'_, T>, strips: [&Strip<T>; 3]) -> Grid<T> {
         let Grid { rows, columns, .. } = &strips[1].grid;
         let mut grid = Grid::new(rows.clone(), columns.clone(), self.planes);
-        grid.tasks().for_each_init(Scratch::default, |scratch, (rows, out)| {
-            let columns = columns.clone();
+        parallel::for_each(grid.tasks(), |(rows, out)| {
+            let (scratch, columns) = (&mut Scratch::default(), columns.clone());
             Task { setting: self, source, strips, scratch, rows, columns, out }.run();
         });
         grid
     }
 }
 
-/// Buffers of one thread.
+/// Buffers of one task.
 #[derive(Default)]
 struct Scratch<T> {
     jets: JetTile<T>,

@@ -5,7 +5,6 @@ use crate::flow::moment_filter::CHUNK;
 use crate::jet::{JetRows, Reach};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::Frame;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Columns of a tile.
@@ -71,9 +70,9 @@ impl<T: SimdReal> Grid<T> {
     }
 
     /// Rows and values of each parallel task.
-    pub fn tasks(&mut self) -> impl IndexedParallelIterator<Item = (&[usize], &mut [T])> {
+    pub fn tasks(&mut self) -> impl Iterator<Item = (&[usize], &mut [T])> {
         let task = self.task_rows();
-        self.rows.par_chunks(task).zip(self.values.par_chunks_mut(task * self.planes * self.columns.len()))
+        self.rows.chunks(task).zip(self.values.chunks_mut(task * self.planes * self.columns.len()))
     }
 
     /// Place of the image row `y` among the rows.

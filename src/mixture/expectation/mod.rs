@@ -4,10 +4,10 @@ mod any;
 mod fixed;
 
 use super::{densities::Densities, moments::Moments, points::BAND, points::BLOCK, points::Planes};
+use crate::parallel;
 use crate::simd::{Lanes, Level, dispatch, exp};
 use any::AnyBand;
 use fixed::Band;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Below this an exponential is zero; a product of it and zero is then zero, whatever the density.
@@ -37,7 +37,7 @@ struct Sums {
 pub(super) fn expect(planes: &Planes, densities: &Densities) -> Expected {
     let bands: Vec<Range<usize>> =
         (0..planes.padded).step_by(BAND).map(|from| from..(from + BAND).min(planes.padded)).collect();
-    let sums: Vec<Sums> = bands.into_par_iter().map(|band| band_sums(planes, densities, band)).collect();
+    let sums: Vec<Sums> = parallel::map(bands, |band| band_sums(planes, densities, band));
     let mut sums = sums.into_iter();
     let mut all = sums.next().expect("there is at least one point");
     for band in sums {

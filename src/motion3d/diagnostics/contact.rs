@@ -9,10 +9,12 @@ use crate::motion3d::model::observations::Row;
 use crate::motion3d::model::result::{CommonEffect, UncertainMotion};
 use crate::motion3d::model::rows::{Matrix5, MidpointDepth};
 use crate::motion3d::model::whitening::plane_row;
-use crate::parallel::Threads;
+use crate::parallel::{self, Threads};
 use crate::types::{FlowField, Intrinsics};
 use nalgebra::{Matrix2x3, SVector, Vector1};
-use rayon::prelude::*;
+
+/// Sites of one task.
+const SITES_PER_TASK: usize = 256;
 
 /// Rates of approach `nu u_z` under a motion.
 pub(crate) struct Rates {
@@ -126,8 +128,8 @@ pub fn contact_map<T: Real>(
         }
         rates.own(&row, half_way)
     };
-    let sites = 0..field.width * field.height;
-    let values: Vec<[f64; 3]> = Threads::default().install(|| sites.into_par_iter().map(at).collect());
+    let sites = field.width * field.height;
+    let values = Threads::default().install(|| parallel::map_range(sites, SITES_PER_TASK, at));
     let plane = |k: usize| values.iter().map(|value| value[k]).collect();
     Ok(ContactMap {
         width: field.width,

@@ -11,13 +11,15 @@ use crate::motion3d::model::input::Flow;
 use crate::motion3d::model::observations::{Observations, Row, SAMPLE};
 use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::solver::{covariance::inverse, refine::FEWER};
+use crate::parallel;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
-use rayon::prelude::*;
 
 /// Share of correlation that falls off as windows stop sharing pixels, and the length, in correlation
 /// lengths, of the rest: measured on residuals of a recorded drive. At four times that one hundredth is left.
 const QUICK: f64 = 0.4;
 const TAIL: f64 = 3.75;
+/// Points of one task, each of which is compared with many others.
+const POINTS_PER_TASK: usize = 16;
 
 /// Correlation of the errors of windowed flow at a distance, in correlation lengths: `0.4 exp(-d^2 / 4) + 0.6
 /// exp(-d / 3.75)`.
@@ -148,7 +150,8 @@ impl Neighbourhood {
             }
             (rows, alike)
         };
-        let (near, products): (Vec<Vector5>, Vec<f64>) = (0..self.all.len()).into_par_iter().map(of_point).unzip();
+        let of_points = parallel::map_range(self.all.len(), POINTS_PER_TASK, of_point);
+        let (near, products): (Vec<Vector5>, Vec<f64>) = of_points.into_iter().unzip();
         let alike = products.iter().sum::<f64>() / squares;
         let expected_at = |stretch: f64| self.expected(&near, (inverse, &information), stretch);
         let mut expected = expected_at(1.0);
@@ -193,7 +196,8 @@ impl Neighbourhood {
         let chosen: Vec<usize> = (step / 2..self.all.len()).step_by(step).collect();
         let each = count / chosen.len().max(1) as f64;
         // Added up in one order, whoever computed them.
-        let parts: Vec<(Matrix5, Matrix5, f64)> = chosen.into_par_iter().map(of_point).collect();
+        let parts: Vec<(Matrix5, Matrix5, f64)> =
+            parallel::map_range(chosen.len(), POINTS_PER_TASK, |k| of_point(chosen[k]));
         let products: Matrix5 = self.all.iter().zip(near).map(|(point, near)| point.row * near.transpose()).sum();
         let sums = information + parts.iter().map(|(own, ..)| own).sum::<Matrix5>() * each;
         let with_near = products + parts.iter().map(|(_, near, _)| near).sum::<Matrix5>() * each;

@@ -16,8 +16,8 @@ use crate::motion3d::robust;
 use crate::motion3d::robust::Consensus;
 use crate::motion3d::solver::covariance::{PluginCovariances, direction_deviation, plugged};
 use crate::motion3d::solver::refine::Minimum;
+use crate::parallel;
 use nalgebra::{Matrix2x3, Matrix3, Vector1};
-use rayon::prelude::*;
 
 /// The whole result of a motion.
 pub(crate) fn report(
@@ -58,7 +58,7 @@ pub(crate) fn report(
         let slopes = rates.slopes(&all.row(k).measurement(), &Vector1::new(likeliest.0));
         (own, smooth, rates.contact(likeliest.0, likeliest.1, &slopes), slopes)
     };
-    let rated: Vec<_> = (0..all.n).into_par_iter().with_min_len(CHUNK).map(rated).collect();
+    let rated = parallel::map_range(all.n, CHUNK, rated);
     // The rate of approach of all inliers together, summed in one order, whoever computed them.
     let (mut weights, mut sum, mut slopes) = (0.0, 0.0, Slopes::zeros());
     for (k, ((nu, variance), smooth, contact, own)) in rated.into_iter().enumerate() {

@@ -6,10 +6,9 @@ use crate::math::Real;
 use crate::motion3d::diagnostics::correlated_noise::area;
 use crate::motion3d::model::{input::check_field, input::refuse_if, options::CommonErrors};
 use crate::motion3d::patches::AffinePatches;
-use crate::parallel::Threads;
+use crate::parallel::{self, Threads};
 use crate::types::{FieldLayout, FlowField, Intrinsics, MOTION_NAMES, Rect, SamplingGrid};
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
-use rayon::prelude::*;
 
 /// Patches of a field, as [`AffinePatches`] takes them.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -59,8 +58,8 @@ pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<
     refuse_if(is_small, "patches", format!("windows of at least {MIN_SPACING} px"), size)?;
     let windows = Windows::new(&field.layout, region, size);
     let sites = windows.pixels_of_windows(field, region);
-    let fitted: Vec<_> = Threads::default()
-        .install(|| sites.par_iter().enumerate().map(|(k, sites)| windows.fit(field, k, sites)).collect());
+    let fitted = Threads::default()
+        .install(|| parallel::map(sites.iter().enumerate(), |(k, sites)| windows.fit(field, k, sites)));
     let mut out = FieldPatches { common: common_errors(field), ..FieldPatches::default() };
     for (k, (motion, covariance)) in fitted.into_iter().enumerate().filter_map(|(k, fit)| Some((k, fit?))) {
         out.points.push(windows.middle(k));

@@ -6,9 +6,9 @@ use super::{over_chunks, symmetric};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{ALIGN, CHUNK, Observations, PLANES};
 use crate::motion3d::model::rows::{Matrix5, Vector5};
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, dispatch};
 use nalgebra::{Matrix2x3, Matrix3, SVector, Vector3};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Points of one chunk with the motion that they are seen with.
@@ -279,8 +279,8 @@ impl Kernel<f64> for DepthPlanes<'_> {
 pub(crate) fn depths(observations: &Observations, motion: &Motion) -> Depths {
     let stride = observations.stride;
     let mut out = Depths { nu: vec![0.0; stride], s2: vec![0.0; stride], e: vec![0.0; stride] };
-    let planes = out.nu.par_chunks_mut(CHUNK).zip(out.s2.par_chunks_mut(CHUNK)).zip(out.e.par_chunks_mut(CHUNK));
-    planes.zip(observations.chunks().collect::<Vec<_>>()).for_each(|(((nu, s2), e), range)| {
+    let planes = out.nu.chunks_mut(CHUNK).zip(out.s2.chunks_mut(CHUNK)).zip(out.e.chunks_mut(CHUNK));
+    parallel::for_each(planes.zip(observations.chunks()), |(((nu, s2), e), range)| {
         let view = View::new(observations, &range, motion);
         dispatch(observations.level, DepthPlanes { view, out: [nu, s2, e] });
     });

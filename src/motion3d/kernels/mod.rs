@@ -12,8 +12,8 @@ pub(crate) use lanes::{Depths, Equations, best_rotation, depths, equations, leas
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{KnownRotation, Observations, Row};
 use crate::motion3d::model::rows::{Matrix5, Vector5};
+use crate::parallel;
 use nalgebra::{Matrix2x3, Matrix3, SMatrix, Vector2};
-use rayon::prelude::*;
 use std::ops::{AddAssign, Range, SubAssign};
 
 /// Adds up what `part` gives for each chunk, in the order of the chunks, whoever computes them.
@@ -25,8 +25,7 @@ fn over_chunks<const R: usize, const C: usize>(
     if chunks.len() < 2 {
         return chunks.into_iter().map(&part).sum();
     }
-    let parts: Vec<_> = chunks.into_par_iter().map(&part).collect();
-    parts.into_iter().sum()
+    parallel::map(chunks, part).into_iter().sum()
 }
 
 /// A symmetric matrix from its upper triangle, row by row.

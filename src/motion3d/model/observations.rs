@@ -2,9 +2,9 @@
 
 use super::{measurement::Measurement, rows::Derotation, rows::Matrix5, rows::Rows, rows::Vector5};
 use crate::math::{median, quantile};
+use crate::parallel;
 use crate::simd::Level;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, SymmetricEigen, Vector2, Vector3};
-use rayon::prelude::*;
 use std::ops::AddAssign;
 
 /// Unknowns of a motion, and the fewest points that determine them.
@@ -117,7 +117,7 @@ impl Observations {
         let n = rows.len();
         let stride = n.next_multiple_of(ALIGN);
         let mut planes = vec![0.0; PLANES * stride];
-        planes.par_chunks_exact_mut(stride.max(1)).enumerate().for_each(|(p, plane)| {
+        parallel::for_each(planes.chunks_exact_mut(stride.max(1)).enumerate(), |(p, plane)| {
             plane.iter_mut().zip(rows).for_each(|(to, row)| *to = row.value(p));
         });
         let size: f64 = planes[..6 * stride].iter().map(|value| value * value).sum();

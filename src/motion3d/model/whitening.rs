@@ -4,9 +4,9 @@ use super::input::{Flow, Noise, Placement, to_plane};
 use super::observations::{CHUNK, Observations, Row};
 use super::rows::{Derotation, Rows};
 use crate::math::{quantile, tangents};
+use crate::parallel;
 use crate::types::Intrinsics;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, SMatrix, SVector, Vector2, Vector3};
-use rayon::prelude::*;
 
 /// What was given, to be whitened as often as another rotation is taken out of its displacements.
 #[derive(Clone)]
@@ -40,10 +40,9 @@ impl<'a> Whitening<'a> {
     /// The usable points in the order given; rows that are not finite or whose covariance is no covariance
     /// are left out.
     pub fn whitened(&self) -> Observations {
-        let sources: Vec<u32> = (0..self.flow.len() as u32).collect();
-        let one = |&k: &u32| Some((self.row(k as usize, None)?, k));
-        let usable: Vec<_> = sources.par_iter().with_min_len(CHUNK).filter_map(one).collect();
-        let (rows, source): (Vec<(Row, [f64; 3])>, Vec<u32>) = usable.into_iter().unzip();
+        let one = |k: usize| Some((self.row(k, None)?, k as u32));
+        let usable = parallel::map_range(self.flow.len(), CHUNK, one);
+        let (rows, source): (Vec<(Row, [f64; 3])>, Vec<u32>) = usable.into_iter().flatten().unzip();
         let (rows, eta): (Vec<Row>, Vec<[f64; 3]>) = rows.into_iter().unzip();
         let spherical = matches!(self.flow, Flow::Sphere { .. });
         let mut out = Observations::new(&rows, eta, spherical, source);
@@ -62,10 +61,9 @@ impl<'a> Whitening<'a> {
     /// point that this leads behind the camera gets weight 0.
     pub fn derotated(&self, points: &Observations, turn: Derotation) -> Observations {
         let nothing = Row { g: Matrix2x3::zeros(), r: Matrix2x3::zeros(), f: Vector2::zeros() };
-        let one = |(&k, &before): (&u32, &[f64; 3])| self.row(k as usize, Some(&turn)).unwrap_or((nothing, before));
-        let (mut rows, mut eta) = (Vec::new(), Vec::new());
-        let given = points.source.par_iter().zip(&points.eta).with_min_len(CHUNK);
-        given.map(one).unzip_into_vecs(&mut rows, &mut eta);
+        let one = |n: usize| self.row(points.source[n] as usize, Some(&turn)).unwrap_or((nothing, points.eta[n]));
+        let turned = parallel::map_range(points.source.len(), CHUNK, one);
+        let (rows, eta): (Vec<Row>, Vec<[f64; 3]>) = turned.into_iter().unzip();
         points.derotated(&rows, eta, turn)
     }
 

@@ -10,8 +10,8 @@ use crate::motion3d::model::{motion::Motion, observations::SAMPLE, rows::Matrix5
 use crate::motion3d::solver::covariance::{PLAUSIBLE, inverse, plugged};
 use crate::motion3d::solver::efficient::{FARTHEST, ROUNDS};
 use crate::motion3d::solver::refine::StoppingCriteria;
+use crate::parallel;
 use nalgebra::{Matrix3, Vector3, Vector6};
-use rayon::prelude::*;
 
 /// Repetitions of few patches.
 const REPETITIONS: u64 = 200;
@@ -102,7 +102,7 @@ pub(crate) fn covariance_factor(
         return 1.0;
     }
     let repeated = |i: u64| distance(&again(system, motion, surfaces, rng.stream(i)), motion, weighted);
-    let mut distances: Vec<f64> = (0..REPETITIONS).into_par_iter().map(repeated).collect();
+    let mut distances: Vec<f64> = parallel::map(0..REPETITIONS, repeated);
     (quantile(&mut distances, 0.95).unwrap_or(0.0) / PLAUSIBLE).max(1.0)
 }
 

@@ -19,8 +19,8 @@ use crate::motion3d::solver::depth_smoother;
 use crate::motion3d::solver::efficient::solve;
 use crate::motion3d::solver::likelihood::cost_of;
 use crate::motion3d::solver::starts::at_most;
+use crate::parallel;
 use crate::scattered::Smoother;
-use rayon::prelude::*;
 
 /// Maximum number of outliers among which a second motion is searched.
 const REJECTED: usize = 128;
@@ -41,11 +41,11 @@ pub(crate) fn among_many_outliers(
     candidates: &[(Motion, f64)],
 ) -> Option<(Motion, Vec<Alternative>)> {
     let own = DepthConsistency::new(on);
-    let refined = candidates.par_iter().filter_map(|(motion, _)| {
+    let refined = parallel::map(candidates, |(motion, _)| {
         let (motion, cost) = refined_by_posterior(on, &own, *motion)?;
         Some((motion, cost, inliers_of(on, &motion)))
     });
-    let mut found: Vec<(Motion, f64, Vec<u32>)> = refined.collect();
+    let mut found: Vec<(Motion, f64, Vec<u32>)> = refined.into_iter().flatten().collect();
     found.sort_by(|a, b| a.1.total_cmp(&b.1));
     let majority = MAJORITY * on.n as f64;
     // The motion of an object may be the likeliest, but it is not the scene's.

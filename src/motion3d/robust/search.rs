@@ -6,9 +6,9 @@ use crate::math::random::CounterRng;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{ALIGN, LESS_ROUND, Observations};
 use crate::motion3d::solver::{refine::StoppingCriteria, refine::refine_cut, starts::apart, starts::evaluate};
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, dispatch};
 use nalgebra::{Matrix3, Vector3};
-use rayon::prelude::*;
 use std::iter::once;
 
 /// Points that the search looks at, and samples of three of them.
@@ -116,7 +116,7 @@ pub(crate) fn robust_motions(own: &Observations, count: usize, rng: CounterRng) 
         }
         motion
     };
-    apart(search(first, INLIER, SPACING, rng), APART, count).into_par_iter().map(descended).collect()
+    parallel::map(apart(search(first, INLIER, SPACING, rng), APART, count), descended)
 }
 
 /// Refines with Tukey's weights, whose cut shrinks from `bound` to that of the inliers.

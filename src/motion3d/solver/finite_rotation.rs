@@ -12,7 +12,7 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::rows::{Matrix5, Vector5};
 use crate::motion3d::model::whitening::Whitening;
-use rayon::prelude::*;
+use crate::parallel;
 use std::borrow::Cow;
 
 /// Points whose residuals are compared.
@@ -98,6 +98,6 @@ pub(crate) fn settle(whitening: &Whitening<'_>, points: &mut Observations, found
         first = with_own_rotation(whitening, points, first.motion);
     }
     let again = |other: &Minimum| refine(points, other.motion, StoppingCriteria::ROUGH);
-    let others: Vec<Minimum> = found[1..].par_iter().map(again).collect();
+    let others: Vec<Minimum> = parallel::map(&found[1..], again);
     *found = different(std::iter::once(first).chain(others).collect());
 }

@@ -11,8 +11,8 @@ use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
 use crate::motion3d::model::options::MotionOptions;
 use crate::motion3d::model::result::Alternative;
+use crate::parallel;
 use crate::scattered::{SiteSmoother, Smoother};
-use rayon::prelude::*;
 
 /// Most minima of few points that are followed on all, and from which smoothed weights are tried.
 const FINALISTS: usize = 3;
@@ -60,8 +60,7 @@ pub(crate) fn minima(observations: &Observations, rng: CounterRng) -> Vec<Minimu
 fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) -> Vec<Minimum> {
     let refined = if observations.n > MANY {
         let fewer = observations.subset(&rng.stream(1).sample(observations.n, FEWER));
-        let rough: Vec<Minimum> =
-            starts.into_par_iter().map(|start| refine(&fewer, start, StoppingCriteria::ROUGH)).collect();
+        let rough: Vec<Minimum> = parallel::map(starts, |start| refine(&fewer, start, StoppingCriteria::ROUGH));
         let smoother = || depth_smoother(&fewer, Smoother::Auto, rng.stream(6));
         let mut finalists = choose(&fewer, &different(rough), smoother).0;
         finalists.truncate(FINALISTS);
@@ -69,7 +68,7 @@ fn refined(observations: &Observations, starts: Vec<Motion>, rng: CounterRng) ->
             |candidate: &Candidate| refine(observations, *candidate.motion(), StoppingCriteria::of(observations.n));
         finalists.iter().map(followed).collect()
     } else {
-        starts.into_par_iter().map(|start| refine(observations, start, StoppingCriteria::FULL)).collect()
+        parallel::map(starts, |start| refine(observations, start, StoppingCriteria::FULL))
     };
     different(refined)
 }

@@ -5,8 +5,8 @@ use crate::ablation::keeps;
 use crate::math::random::CounterRng;
 use crate::motion3d::kernels::best_rotation;
 use crate::motion3d::model::{motion::Motion, observations::Observations};
+use crate::parallel;
 use nalgebra::Vector3;
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Directions on the half sphere, about 8 degrees apart.
@@ -42,7 +42,7 @@ pub(crate) fn half_sphere() -> Vec<Vector3<f64>> {
 /// Evaluates every direction of the half sphere, in groups that threads share.
 pub(crate) fn evaluate<R: Send>(work: impl Fn(&Vector3<f64>) -> Option<R> + Sync) -> Vec<R> {
     let groups: Vec<Vec<R>> =
-        half_sphere().par_chunks(TOGETHER).map(|group| group.iter().filter_map(&work).collect()).collect();
+        parallel::map(half_sphere().chunks(TOGETHER), |group| group.iter().filter_map(&work).collect());
     groups.into_iter().flatten().collect()
 }
 
@@ -99,7 +99,8 @@ fn basins(observations: &Observations, all: &[(Motion, f64)], rng: CounterRng) -
         let minimum = refine(few, motion, STEPS);
         (minimum.motion, minimum.equations.cost)
     };
-    apart(all.to_vec(), APART, all.len()).par_iter().with_min_len(TOGETHER).map(descended).collect()
+    let motions = apart(all.to_vec(), APART, all.len());
+    parallel::map_range(motions.len(), TOGETHER, |k| descended(&motions[k]))
 }
 
 #[cfg(test)]

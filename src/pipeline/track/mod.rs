@@ -11,10 +11,9 @@ use super::{prefetch::Prefetch, run::Numbering, run::check_size, sink::Sink, sin
 use crate::error::{Error, Result};
 use crate::image::Preprocess;
 use crate::io::FrameSource;
-use crate::parallel::{Progress, Threads};
+use crate::parallel::{self, Progress, Threads};
 use crate::track::{GreyLevels, Tracker};
 use crate::types::{AnyFrame, Frame, TrackState, TrackStatus};
-use rayon::prelude::*;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -144,7 +143,8 @@ impl TrackRun {
             levels = levels.revised(std::slice::from_ref(&frame));
             let grey = self.prepared(&frame, levels);
             let states = self.threads.install(|| {
-                trackers.par_iter_mut().map(|tracker| tracker.update(&grey)).collect::<Result<Vec<TrackState>>>()
+                let states = parallel::map(&mut trackers, |tracker| tracker.update(&grey));
+                states.into_iter().collect::<Result<Vec<TrackState>>>()
             })?;
             self.deliver(&frame, frames.last_time(), &states)?;
         }

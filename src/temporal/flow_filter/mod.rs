@@ -9,12 +9,11 @@ use super::options::FlowFilterOptions;
 use super::store::Store;
 use crate::error::{Error, Result};
 use crate::jet::JetStencil;
-use crate::parallel::{Threads, checkpoint, shared_checkpoint};
+use crate::parallel::{self, Threads, checkpoint, shared_checkpoint};
 use crate::simd::{Level, SimdReal};
 use crate::types::{FieldLayout, FlowField, Frame, Interval, MOTION_NAMES, Status};
 pub(super) use pass::PAIRS;
 use pass::{COVARIANCE, Mark, RESIDUAL, Rows};
-use rayon::prelude::*;
 
 /// One Kalman filter a site, fed with frames: WO2010/098160, (44), (54), (55).
 ///
@@ -193,9 +192,10 @@ impl<T: SimdReal> FlowFilter<T> {
             }
         };
         let units = MOTION_NAMES.map(|name| options.units.scale(name));
-        field.motion.par_chunks_exact_mut(n).enumerate().for_each(|(k, plane)| fill(plane, k, units[k]));
+        parallel::for_each(field.motion.chunks_exact_mut(n).enumerate(), |(k, plane)| fill(plane, k, units[k]));
         if let Some(covariance) = &mut field.covariance {
-            covariance.par_chunks_exact_mut(n).zip(&PAIRS[..]).enumerate().for_each(|(k, (plane, &(a, b)))| {
+            let planes = covariance.chunks_exact_mut(n).zip(&PAIRS).enumerate();
+            parallel::for_each(planes, |(k, (plane, &(a, b)))| {
                 fill(plane, COVARIANCE + k, units[a] * units[b]);
             });
         }

@@ -2,7 +2,7 @@
 
 use super::FlowFilter;
 use crate::error::{Error, Result};
-use crate::parallel::shared_checkpoint;
+use crate::parallel::{self, shared_checkpoint};
 use crate::simd::{Level, SimdReal, dispatch};
 use crate::temporal::kernel::predict::{AUGMENTED, EXTENDED, FAST, NON_AUGMENTED, Predict};
 use crate::temporal::kernel::transition::{Exact, Rk4, Step};
@@ -11,7 +11,6 @@ use crate::temporal::kernel::{BLOCK, Constants, N, PLANES, packed, places};
 use crate::temporal::measurement::{Fit, Measure};
 use crate::temporal::options::{FilterForm, Transition};
 use crate::types::Frame;
-use rayon::prelude::*;
 use std::any::Any;
 use std::marker::PhantomData;
 
@@ -81,11 +80,11 @@ fn every_block<T: SimdReal>(filter: &mut FlowFilter<T>, frame: &Frame<T>, marks:
         contraction: T::from_f64(CONTRACTION / options.neighbourhood.spread().powi(2)),
         is_first: filter.frames == 0,
     };
-    let states = store.blocks.par_chunks_mut(PLANES * BLOCK * TASK_BLOCKS);
-    let pixels = store.pixels.par_chunks(BLOCK * TASK_BLOCKS);
-    let marks = marks.par_chunks_mut(TASK_BLOCKS);
-    let results = results.par_chunks_mut(rows.count * BLOCK * TASK_BLOCKS);
-    states.zip(pixels).zip(marks).zip(results).for_each(|(((states, pixels), marks), results)| {
+    let states = store.blocks.chunks_mut(PLANES * BLOCK * TASK_BLOCKS);
+    let pixels = store.pixels.chunks(BLOCK * TASK_BLOCKS);
+    let marks = marks.chunks_mut(TASK_BLOCKS);
+    let results = results.chunks_mut(rows.count * BLOCK * TASK_BLOCKS);
+    parallel::for_each(states.zip(pixels).zip(marks).zip(results), |(((states, pixels), marks), results)| {
         checkpoint();
         let states = states.chunks_mut(PLANES * BLOCK * PASS_BLOCKS);
         let pixels = pixels.chunks(BLOCK * PASS_BLOCKS);

@@ -5,10 +5,9 @@ use super::options::RecursiveOptions;
 use crate::error::{Error, Result};
 use crate::flow::Estimator;
 use crate::flow::symmetric::{ENTRIES, upper};
-use crate::parallel::Threads;
+use crate::parallel::{self, Threads};
 use crate::simd::{Level, SimdReal, dispatch, same_mut};
 use crate::types::{FlowField, Status};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Blocks of one task: fixed, so that results do not depend on the number of threads.
@@ -152,7 +151,7 @@ impl<T: SimdReal> RecursiveFusion<T> {
             tasks.iter_mut().zip(plane.chunks(size)).for_each(|(task, part)| task.systematic.push(part));
         }
         let (level, forgetting) = (self.level, self.options.forgetting);
-        self.threads.install(|| tasks.par_iter_mut().for_each(|task| task.run(level, forgetting)));
+        self.threads.install(|| parallel::for_each(&mut tasks, |task| task.run(level, forgetting)));
     }
 }
 

@@ -8,9 +8,9 @@ use super::noise::near_radius;
 use super::options::{ForegroundModel, ParticleOptions};
 use crate::error::Result;
 use crate::mixture::{CovariancePrior, DirichletMixture, DirichletOptions, Points, fit_dirichlet};
+use crate::parallel;
 use crate::segment::{Labels, felzenszwalb};
 use crate::types::{ColourFrame, Frame};
-use rayon::prelude::*;
 
 /// Components of each mixture, at most.
 const COMPONENTS: usize = 12;
@@ -168,7 +168,7 @@ impl ForegroundMap {
         let components: Vec<Gaussian> = used.map(|k| Gaussian::of(&mixture, k)).collect();
         let mut areas = vec![0u32; labels.count];
         labels.labels.iter().for_each(|&label| areas[label as usize] += 1);
-        let means = components.par_iter().map(|component| region_means(component, &labels, &areas)).collect();
+        let means = parallel::map(&components, |component| region_means(component, &labels, &areas));
         Ok(Self { labels, components, means, radius })
     }
 

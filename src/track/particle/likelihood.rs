@@ -1,7 +1,7 @@
 //! Logarithms of the factors of a particle's likelihood.
 
 use super::cloud::Particle;
-use rayon::prelude::*;
+use crate::parallel;
 
 /// Log-likelihood of a particle whose centre is outside the picture.
 const OUTSIDE: f64 = -50.0;
@@ -146,7 +146,7 @@ impl Factors<'_> {
     pub fn log_likelihoods(&self, particles: &[Particle]) -> Vec<f64> {
         let greatest = self.foreground.map_or(0.0, |values| values.iter().copied().fold(0.0, f64::max));
         let mut logs = vec![0.0; particles.len()];
-        logs.par_chunks_mut(TASK).enumerate().for_each(|(task, logs)| {
+        parallel::for_each(logs.chunks_mut(TASK).enumerate(), |(task, logs)| {
             for (k, log) in logs.iter_mut().enumerate() {
                 let at = task * TASK + k;
                 let particle = &particles[at];

@@ -16,9 +16,9 @@ use super::view::{View, revised};
 use crate::error::{Error, Result};
 use crate::flow::points::PointPyramid;
 use crate::math::random::CounterRng;
+use crate::parallel;
 use crate::track::GreyLevels;
 use crate::types::{AnyColourFrame, Frame, TargetBox};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Growth of areas between two frames that a given camera may have.
@@ -267,8 +267,8 @@ impl ParticleTracker {
             foreground: map.as_ref(),
             predictions: &predictions,
         };
-        let active = self.targets.par_iter_mut().enumerate().filter(|(_, target)| !target.is_out);
-        active.for_each(|(own, target)| target.advance(own, &context));
+        let active = self.targets.iter_mut().enumerate().filter(|(_, target)| !target.is_out);
+        parallel::for_each(active, |(own, target)| target.advance(own, &context));
         self.learn(&predictions, &camera, was_cut);
         self.step = self.report(&camera, &predictions, if was_cut { StepCause::Cut } else { StepCause::Frame });
         self.corners.top_up(&view.grey)?;

@@ -4,7 +4,7 @@ use super::cell_luminance::CellLuminance;
 use super::clusters::Clusters;
 use super::lucas_kanade::SmoothedLevels;
 use super::overlap::{Row, depth_motion};
-use rayon::prelude::*;
+use crate::parallel;
 
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct ObservedStep {
@@ -37,5 +37,5 @@ pub(super) fn cell_motions(from: &ObservedStep, to: &ObservedStep, reach: i32) -
         let [dx, dy] = found.shift;
         Some(CellMotion { shift: [dx, dy, depth.shift], difference: found.difference, overlaps: depth.overlaps })
     };
-    (0..from.clusters.components()).into_par_iter().map(one).collect()
+    parallel::map(0..from.clusters.components(), one)
 }

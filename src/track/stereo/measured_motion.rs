@@ -7,8 +7,8 @@ use super::clusters::Clusters;
 use super::depth_change::{nearest, robust_mean};
 use super::exposure::Exposure;
 use super::lucas_kanade::{SmoothedLevels, affine_motion};
+use crate::parallel;
 use crate::types::Frame;
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// Starts nearer to each other count as one, px.
@@ -70,7 +70,7 @@ pub(super) fn measure_motions(
         let (depth, support) = depth_change(&from.clusters, k, &plane, next.disparity)?;
         (depth.abs() <= f64::from(reach)).then_some(ClusterMotion { plane, depth, support })
     };
-    (0..from.clusters.components()).into_par_iter().map(one).collect()
+    parallel::map(0..from.clusters.components(), one)
 }
 
 fn plane_motions(
@@ -88,7 +88,7 @@ fn plane_motions(
         let starts = starts(last, next.luminance, k, guesses[k], reach);
         affine_motion(&last.levels, next.levels, &pixels, &starts)
     };
-    (0..last.clusters.components()).into_par_iter().map(search).collect()
+    parallel::map(0..last.clusters.components(), search)
 }
 
 /// Change of the disparity of a moved cluster, and the share of its pixels that agree; `None` where too few

@@ -4,10 +4,11 @@
 //! spread over a strip. The squared jump, times the share of sites on the wrong side, is added along its own
 //! direction.
 
+use super::NODES_PER_TASK;
 use crate::flow::coarse_to_fine::nodes::{binomial_mean, sites_around};
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
+use crate::parallel;
 use crate::simd::SimdReal;
-use rayon::prelude::*;
 
 /// Unexplained strain between neighbouring sites, 1/frame, of which half counts as a jump: above that of
 /// curved motion.
@@ -20,7 +21,7 @@ pub(super) const SLOPE_SHARE: f64 = 1.0 / (BOUNDARY_WIDTH * BOUNDARY_WIDTH);
 
 /// Variances `xx, xy, yy` of the flow, px^2, at every node.
 pub(super) fn boundary_errors<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec<[f64; 3]> {
-    let rows: Vec<Vec<[f64; 3]>> = (0..motion.height).into_par_iter().map(|y| jumps(motion, y)).collect();
+    let rows: Vec<Vec<[f64; 3]>> = parallel::map(0..motion.height, |y| jumps(motion, y));
     let node = |n: usize| {
         let (mut sum, mut weights) = ([0.0; 3], 0.0);
         for (y, down) in sites_around(n / width, motion.height) {
@@ -31,7 +32,7 @@ pub(super) fn boundary_errors<T: SimdReal>(motion: &Planes<T>, (width, height): 
         }
         sum.map(|sum| sum / weights)
     };
-    let mut errors: Vec<[f64; 3]> = (0..width * height).into_par_iter().map(node).collect();
+    let mut errors: Vec<[f64; 3]> = parallel::map_range(width * height, NODES_PER_TASK, node);
     binomial_mean(&mut errors, (width, height));
     errors
 }

@@ -15,8 +15,8 @@ use crate::flow::coarse_to_fine::nodes::binomial_mean;
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, TERMS, WindowStatistics};
 use crate::flow::symmetric::{ENTRIES, upper};
+use crate::parallel;
 use crate::simd::SimdReal;
-use rayon::prelude::*;
 use std::f64::consts::SQRT_2;
 
 /// Standard deviation of the fixed Gaussian, px: about twice that of the windows chosen in curved flow.
@@ -76,27 +76,24 @@ fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec
     let kernels = [FIXED_SIGMA / SITE_SPACING, FIXED_SIGMA / SITE_SPACING * SQRT_2];
     let along = kernels.map(|s| gaussians(s, (width, SITES_PER_NODE), motion.width));
     let across = kernels.map(|s| gaussians(s, (height, SITES_PER_NODE), motion.height));
-    let rows: Vec<Vec<Loss>> = (0..height)
-        .into_par_iter()
-        .map(|y| {
-            let mut lost: Vec<Loss> = (0..width).map(|x| motion_at(motion, (x, y))).collect();
-            let mut down = vec![T::from_f64(0.0); motion.width];
-            for k in 0..MOTION {
-                for (factor, (across, along)) in [-2.0, 1.0].into_iter().zip(across.iter().zip(&along)) {
-                    down.fill(T::from_f64(0.0));
-                    for &(site, weight) in &across[y] {
-                        let weight = T::from_f64(weight);
-                        down.iter_mut().zip(motion.line(k, site)).for_each(|(d, m)| *d += weight * *m);
-                    }
-                    for (lost, taps) in lost.iter_mut().zip(along) {
-                        let sum: f64 = taps.iter().map(|&(site, weight)| weight * down[site].to_f64()).sum();
-                        lost[k] += factor * sum;
-                    }
+    let rows: Vec<Vec<Loss>> = parallel::map(0..height, |y| {
+        let mut lost: Vec<Loss> = (0..width).map(|x| motion_at(motion, (x, y))).collect();
+        let mut down = vec![T::from_f64(0.0); motion.width];
+        for k in 0..MOTION {
+            for (factor, (across, along)) in [-2.0, 1.0].into_iter().zip(across.iter().zip(&along)) {
+                down.fill(T::from_f64(0.0));
+                for &(site, weight) in &across[y] {
+                    let weight = T::from_f64(weight);
+                    down.iter_mut().zip(motion.line(k, site)).for_each(|(d, m)| *d += weight * *m);
+                }
+                for (lost, taps) in lost.iter_mut().zip(along) {
+                    let sum: f64 = taps.iter().map(|&(site, weight)| weight * down[site].to_f64()).sum();
+                    lost[k] += factor * sum;
                 }
             }
-            lost
-        })
-        .collect();
+        }
+        lost
+    });
     rows.concat()
 }
 
@@ -137,9 +134,10 @@ fn subtract_smooth(values: &mut [Loss], rows: &mut [Loss], (along, across): &(Ve
         }
         sum
     };
-    let nodes = rows.par_iter_mut().enumerate().with_min_len(NODES_PER_TASK);
-    nodes.for_each(|(n, out)| *out = mean(values, &along[n % width], n - n % width, 1));
-    values.par_iter_mut().enumerate().with_min_len(NODES_PER_TASK).for_each(|(n, value)| {
+    parallel::for_each_value(rows, NODES_PER_TASK, |n, out| {
+        *out = mean(values, &along[n % width], n - n % width, 1);
+    });
+    parallel::for_each_value(values, NODES_PER_TASK, |n, value| {
         let smooth = mean(rows, &across[n / width], n % width, width);
         (0..MOTION).for_each(|k| value[k] -= smooth[k]);
     });

@@ -7,8 +7,8 @@ use super::{Entries, NODES_PER_TASK};
 use crate::flow::coarse_to_fine::nodes::NodeAxis;
 use crate::flow::coarse_to_fine::{planes::Planes, planes::SITE_SPACING, refine::SITES_PER_NODE};
 use crate::flow::symmetric::{ENTRIES, upper};
+use crate::parallel;
 use crate::simd::SimdReal;
-use rayon::prelude::*;
 
 type Square = [[f64; 6]; 6];
 
@@ -18,18 +18,14 @@ pub(super) fn to_first_frame<T: SimdReal>(
     axes: (NodeAxis, NodeAxis),
 ) -> Vec<Entries> {
     let last = (motion.width - 1, motion.height - 1);
-    (0..nodes.len())
-        .into_par_iter()
-        .with_min_len(NODES_PER_TASK)
-        .map(|n| {
-            let (x, y) = (n % axes.0.count, n / axes.0.count);
-            let m = super::curvature_bias::motion_at(motion, (x, y));
-            let node = |n: usize, last: usize| (SITES_PER_NODE * n).min(last) as f64 / SITES_PER_NODE as f64;
-            let half_way = 0.5 / (SITE_SPACING * SITES_PER_NODE as f64);
-            let there = blend(nodes, axes, node(x, last.0) + half_way * m[0], node(y, last.1) + half_way * m[1]);
-            inverse_half_step(&m).map_or(there, |inverse| transformed(&there, &inverse))
-        })
-        .collect()
+    parallel::map_range(nodes.len(), NODES_PER_TASK, |n| {
+        let (x, y) = (n % axes.0.count, n / axes.0.count);
+        let m = super::curvature_bias::motion_at(motion, (x, y));
+        let node = |n: usize, last: usize| (SITES_PER_NODE * n).min(last) as f64 / SITES_PER_NODE as f64;
+        let half_way = 0.5 / (SITE_SPACING * SITES_PER_NODE as f64);
+        let there = blend(nodes, axes, node(x, last.0) + half_way * m[0], node(y, last.1) + half_way * m[1]);
+        inverse_half_step(&m).map_or(there, |inverse| transformed(&there, &inverse))
+    })
 }
 
 /// Linear between the nodes, constant beyond.

@@ -33,6 +33,7 @@ mod noise;
 use super::{estimate::Estimate, nodes::NodeAxis, peak_locking::PeakLocking, planes::Planes};
 use crate::ablation::keeps;
 use crate::flow::symmetric::{ENTRIES, upper};
+use crate::parallel;
 use crate::simd::SimdReal;
 use boundary_error::boundary_errors;
 use coarse_level_error::{CoarseLevelError, CoarseLevelErrors};
@@ -42,7 +43,6 @@ use extrapolation::Extrapolation;
 pub(super) use map::CovarianceMap;
 pub(super) use noise::Energy;
 use noise::{Noise, RemainingNoise};
-use rayon::prelude::*;
 
 /// Variance of the flow over that of white noise of the density seen between windows, for two and for three
 /// frames: real noise is not white, and strongest where windows do not remove it.
@@ -113,7 +113,7 @@ pub(super) fn covariance<T: SimdReal>(
     let extrapolation = Extrapolation::new(&estimate.motion, statistics, textured_support);
     let kind = usize::from(!is_pair);
     // Beside each other: one thread does much of either.
-    let (coarse_errors, mut nodes) = rayon::join(
+    let (coarse_errors, mut nodes) = parallel::join(
         || {
             let constrained = ConstrainedDirections::new(&estimate.data, &noise, (width, height));
             CoarseLevelErrors::new(&estimate.motion, &estimate.coarser_motions, constrained).at_nodes((width, height))
@@ -164,13 +164,11 @@ pub(super) fn covariance<T: SimdReal>(
         node.iter_mut().zip(&noise_part).for_each(|(entry, noise)| *entry += noise);
         noise_part
     };
-    let completed = nodes.par_iter_mut().enumerate().with_min_len(NODES_PER_TASK).map(complete);
-    let mut noises: Vec<Entries> = Vec::new();
-    if with_systematic {
-        completed.collect_into_vec(&mut noises);
-    } else {
-        completed.for_each(drop);
-    }
+    let tasks = nodes.chunks_mut(NODES_PER_TASK).enumerate();
+    let noises = parallel::map(tasks, |(task, nodes)| {
+        let completed = (task * NODES_PER_TASK..).zip(nodes).map(complete);
+        completed.filter(|_| with_systematic).collect::<Vec<Entries>>()
+    });
     let map = |nodes: Vec<Entries>| {
         let carried = if is_pair { first_frame::to_first_frame(&nodes, &estimate.motion, axes) } else { nodes };
         CovarianceMap::new(&carried, axes, estimate.level)
@@ -179,15 +177,15 @@ pub(super) fn covariance<T: SimdReal>(
         let without = |(node, noise): (&Entries, &Entries)| {
             std::array::from_fn(|k| node[k] - (1.0 - REPEATED_NOISE_SHARE) * noise[k])
         };
-        map(nodes.iter().zip(&noises).map(without).collect())
+        map(nodes.iter().zip(noises.iter().flatten()).map(without).collect())
     });
     CovarianceMaps { whole: map(nodes), systematic }
 }
 
 /// Support of sites with data and texture, if smaller than that of sites with data but not negligible.
 fn textured_support<T: SimdReal>(noise: &Noise<'_, T>, data: &Planes<T>, size: (usize, usize)) -> Option<DataSupport> {
-    let nodes = (0..size.0 * size.1).into_par_iter();
-    let textured: Vec<bool> = nodes.map(|n| noise.is_textured(data, n % size.0, n / size.0)).collect();
+    let is_textured = |n: usize| noise.is_textured(data, n % size.0, n / size.0);
+    let textured: Vec<bool> = parallel::map_range(size.0 * size.1, NODES_PER_TASK, is_textured);
     let count = textured.iter().filter(|textured| **textured).count();
     let tells = count < textured.len() && count as f64 >= MIN_TEXTURED_SHARE * textured.len() as f64;
     tells.then(|| DataSupport::textured(data, size, &textured))

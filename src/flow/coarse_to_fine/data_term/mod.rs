@@ -35,11 +35,11 @@ pub(super) use warp::{is_usable, sample_views};
 
 use super::planes::Planes;
 use crate::image::Spline;
+use crate::parallel;
 use crate::simd::{Level, SimdReal, dispatch};
 use crate::types::Mask;
 use band::{Band, Task};
 use moments::taps;
-use rayon::prelude::*;
 use scratch::Scratch;
 use std::sync::{Mutex, PoisonError};
 
@@ -164,20 +164,15 @@ impl<'a, T: SimdReal> DataTerm<'a, T> {
         };
         let rows = band_rows(height);
         let len = out.row_len();
-        let residuals: Vec<Vec<T>> = out
-            .data_mut()
-            .par_chunks_mut(rows * len)
-            .enumerate()
-            .map(|(band, out)| {
-                let mut scratch = self.lock().pop().unwrap_or_default();
-                let sites = band * rows..(band * rows + out.len() / len);
-                let mut residuals = Vec::new();
-                let kernel = Band { task: &task, rows: sites, out, residuals: &mut residuals, scratch: &mut scratch };
-                dispatch(self.level, kernel);
-                self.lock().push(scratch);
-                residuals
-            })
-            .collect();
+        let residuals: Vec<Vec<T>> = parallel::map(out.data_mut().chunks_mut(rows * len).enumerate(), |(band, out)| {
+            let mut scratch = self.lock().pop().unwrap_or_default();
+            let sites = band * rows..(band * rows + out.len() / len);
+            let mut residuals = Vec::new();
+            let kernel = Band { task: &task, rows: sites, out, residuals: &mut residuals, scratch: &mut scratch };
+            dispatch(self.level, kernel);
+            self.lock().push(scratch);
+            residuals
+        });
         residuals.concat()
     }
 

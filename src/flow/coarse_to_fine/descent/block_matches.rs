@@ -6,9 +6,9 @@
 //! ([`super::comparison`]).
 
 use crate::flow::coarse_to_fine::{data_term::View, planes::Planes, planes::SITE_SPACING};
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::Frame;
-use rayon::prelude::*;
 use std::ops::RangeInclusive;
 
 /// Side of a block, px of the level, and distance of their corners.
@@ -40,8 +40,7 @@ pub(super) fn block_matches<T: SimdReal>(
     let corners =
         (0..=height - SIDE).step_by(SPACING).flat_map(|y| (0..=width - SIDE).step_by(SPACING).map(move |x| (x, y)));
     let search = Search { simd, pictures: &pictures, motion, time: from.time.to_f64() as f32 };
-    let mut matches: Vec<Match> =
-        corners.collect::<Vec<_>>().into_par_iter().filter_map(|corner| search.block(corner)).collect();
+    let mut matches: Vec<Match> = parallel::map(corners, |corner| search.block(corner)).into_iter().flatten().collect();
     // The best is written last.
     let is_empty = matches.is_empty();
     matches.sort_by(|a, b| a.correlation.total_cmp(&b.correlation));

@@ -13,9 +13,8 @@ use crate::flow::coarse_to_fine::data_term::{View, is_usable};
 use crate::flow::coarse_to_fine::extended::Field;
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::{LEFT, Planes, SITE_SPACING};
-use crate::parallel::for_each_band;
+use crate::parallel::{self, for_each_band};
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Half the side of the window, sites; every second site of it counts, as on a chessboard.
@@ -38,6 +37,8 @@ const HALVINGS: usize = 6;
 
 /// Planes that medians are taken of: flow, brightness along it, explained share.
 const PREPARED: usize = 4;
+/// Rows of one task, before medians are taken.
+const ROWS_PER_TASK: usize = 8;
 const BRIGHTNESS: usize = 2;
 const EXPLAINED: usize = 3;
 
@@ -74,8 +75,10 @@ pub(super) fn sharpen_boundaries<T: SimdReal>(
     let mut prepared = Field::make(space, size.0, size.1, PREPARED);
     prepared.data_mut().fill(T::from_f64(0.0));
     let (len, windows) = (prepared.row_len(), around(&sites, size));
-    prepared.rows_mut().par_chunks_mut(len).enumerate().with_min_len(8).for_each(|(y, row)| {
-        dispatch(simd, Prepare { along: &comparison, motion, y, sites: &windows[y * size.0..][..size.0], row });
+    parallel::for_each(prepared.rows_mut().chunks_mut(ROWS_PER_TASK * len).enumerate(), |(task, rows)| {
+        for (y, row) in (task * ROWS_PER_TASK..).zip(rows.chunks_mut(len)) {
+            dispatch(simd, Prepare { along: &comparison, motion, y, sites: &windows[y * size.0..][..size.0], row });
+        }
     });
     let len = motion.row_len();
     let stride = motion.stride();

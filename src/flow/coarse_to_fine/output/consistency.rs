@@ -4,9 +4,9 @@ use crate::flow::coarse_to_fine::brightness_scale::MIN_RESIDUAL_SHARE;
 use crate::flow::coarse_to_fine::data_term::{DataOptions, ENERGY, UU, VV};
 use crate::flow::coarse_to_fine::estimate::Estimate;
 use crate::flow::coarse_to_fine::planes::Planes;
+use crate::parallel;
 use crate::simd::SimdReal;
 use crate::types::Mask;
-use rayon::prelude::*;
 
 /// Approximate maximum number of sites in the median of the energy.
 const MAX_SAMPLES: usize = 20_000;
@@ -42,13 +42,16 @@ impl Consistency {
             stands_out || (energy > UNRELATED.0 * information && energy > least)
         };
         let mut contradicted = Mask::filled(data.width, data.height, false);
-        let rows = contradicted.data_mut().par_chunks_mut(data.width.max(1)).enumerate().with_min_len(ROWS_PER_TASK);
-        let rows = rows.map(|(y, row)| {
+        let width = data.width.max(1);
+        let row = |(y, row): (usize, &mut [bool])| {
             row.iter_mut().zip(row_energies(data, y)).for_each(|(out, site)| *out = is_contradicted(site));
             row.contains(&true)
-        });
-        let rows = rows.collect();
-        Self { contradicted, rows }
+        };
+        let rows =
+            parallel::map(contradicted.data_mut().chunks_mut(ROWS_PER_TASK * width).enumerate(), |(task, rows)| {
+                (task * ROWS_PER_TASK..).zip(rows.chunks_mut(width)).map(row).collect::<Vec<bool>>()
+            });
+        Self { contradicted, rows: rows.concat() }
     }
 
     pub fn is_contradicted(&self, x: usize, y: usize) -> bool {

@@ -16,10 +16,10 @@ use crate::flow::options::EstimatorOptions;
 use crate::flow::site::{FieldBand, bands};
 use crate::flow::symmetric::upper;
 use crate::image::{are_rounded, halved_noise, halved_size};
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::{FlowField, Frame, Mask, SamplingGrid, Status};
 use consistency::Consistency;
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Sum of the squared weights of a data term's rows: one of brightness, two of its gradient.
@@ -76,7 +76,7 @@ pub(super) fn fill<T: SimdReal>(
         statistics: estimate.statistics.as_ref(),
     };
     let (sites, width) = (field.layout.sites.clone(), field.width);
-    bands(field).into_par_iter().for_each(|mut band| match &sites {
+    parallel::for_each(bands(field), |mut band| match &sites {
         SamplingGrid::Points(points) => writer.points(points, &mut band),
         SamplingGrid::Grid { .. } => {
             dispatch(writer.simd, Rows { writer: &writer, sites: &sites, width, band: &mut band });

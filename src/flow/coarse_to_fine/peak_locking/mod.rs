@@ -16,8 +16,8 @@ use super::planes::{LEFT, Planes};
 use super::pyramid::{ComparedFrames, PyramidLevel};
 use crate::ablation::keeps;
 use crate::math::{median, robust_std};
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
-use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 
 /// Samples along a patch's side; the outermost only serve the stencils.
@@ -31,6 +31,8 @@ const HALF_WEIGHT_SCATTER: f64 = 2.5;
 const ROBUST_ROUNDS: usize = 5;
 /// Maximum amplitude of peak locking, px.
 const MAX_AMPLITUDE: f64 = 0.1;
+/// Rows of one task.
+const ROWS_PER_TASK: usize = 32;
 
 /// Bias of the flow, `amplitude sin(2 pi cycles flow)` along each axis.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -59,17 +61,14 @@ impl PeakLocking {
         let count = |len: usize| if len < SIDE { 0 } else { (len - SIDE) / spacing + 1 };
         let (columns, rows) = (count(width), count(height));
         let inverse = residual_std.map_or(0.0, |s| 1.0 / (DataOptions::default().robust * s.to_f64()).max(1e-15));
-        let sums: Vec<[Sums; 2]> = (0..columns * rows)
-            .into_par_iter()
-            .filter_map(|n| {
-                // Centred in the remainder of the spacing.
-                let start = |n: usize, count: usize, len: usize| {
-                    n * spacing + (((len - SIDE - (count - 1) * spacing) / 2) & !1)
-                };
-                let corner = (start(n % columns, columns, width), start(n / columns, rows, height));
-                Patch::new(motion, corner, cycles).sums(simd, &views, (width, height), inverse)
-            })
-            .collect();
+        let sums = parallel::map(0..columns * rows, |n| {
+            // Centred in the remainder of the spacing.
+            let start =
+                |n: usize, count: usize, len: usize| n * spacing + (((len - SIDE - (count - 1) * spacing) / 2) & !1);
+            let corner = (start(n % columns, columns, width), start(n / columns, rows, height));
+            Patch::new(motion, corner, cycles).sums(simd, &views, (width, height), inverse)
+        });
+        let sums: Vec<[Sums; 2]> = sums.into_iter().flatten().collect();
         let mut found = Self { cycles, ..Self::default() };
         if sums.len() >= MIN_PATCHES {
             for c in 0..2 {
@@ -84,8 +83,10 @@ impl PeakLocking {
             return;
         }
         let (stride, len) = (motion.stride(), motion.row_len().max(1));
-        motion.data_mut().par_chunks_mut(len).with_min_len(32).for_each(|row| {
-            dispatch(simd, Correct { locking: self, row, stride });
+        parallel::for_each(motion.data_mut().chunks_mut(ROWS_PER_TASK * len), |rows| {
+            for row in rows.chunks_mut(len) {
+                dispatch(simd, Correct { locking: self, row, stride });
+            }
         });
     }
 

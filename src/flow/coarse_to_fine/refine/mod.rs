@@ -34,12 +34,12 @@ mod upsample;
 mod window_statistics;
 
 use super::{extended::Field, plane_pool::PlanePool, planes::LEFT, planes::Planes, planes::SITE_SPACING};
+use crate::parallel;
 use crate::simd::{Level, SimdReal};
 use fit::{FIT, FLOW};
 pub(super) use ladder::TERMS;
 use ladder::{Ladder, Scale};
 pub(super) use options::RefineOptions;
-use rayon::prelude::*;
 use regional_means::Fitted;
 pub(super) use window_statistics::{SITES_PER_NODE, WindowStatistics, node_count};
 
@@ -66,10 +66,10 @@ pub(super) fn refine<T: SimdReal>(
     };
     let sample_step = |scale: &Scale<T>| if scale.octave == 0 { 2 } else { 1 };
     let mut fits: Vec<_> = ladder.scales.iter().map(|s| field(s.octave, 1, FIT)).collect();
-    fits.par_iter_mut().zip(&ladder.scales).for_each(|(out, s)| fit::fits(simd, &grids[s.octave], s, out));
+    parallel::for_each(fits.iter_mut().zip(&ladder.scales), |(out, s)| fit::fits(simd, &grids[s.octave], s, out));
     let mut samples: Vec<_> = ladder.scales.iter().map(|s| field(s.octave, sample_step(s), 2)).collect();
-    let fitted = samples.par_iter_mut().zip(&fits).zip(&ladder.scales);
-    fitted.for_each(|((out, fits), s)| fit::samples(simd, fits, s, sample_step(s), out));
+    let fitted = samples.iter_mut().zip(&fits).zip(&ladder.scales);
+    parallel::for_each(fitted, |((out, fits), s)| fit::samples(simd, fits, s, sample_step(s), out));
     let fitted = Fitted { fits: &fits, samples };
     let means = regional_means::regional_means(simd, space, options, &ladder, &fitted, data);
     Field::keep(space, fitted.samples);

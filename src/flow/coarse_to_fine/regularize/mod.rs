@@ -23,8 +23,8 @@ mod tests;
 
 use super::{data_term::ERROR, data_term::VALID, planes::LEFT, planes::Planes};
 use crate::math::median;
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
-use rayon::prelude::*;
 use smoothness::SmoothnessProblem;
 
 /// Planes of the data term that hold equations: those before the energies.
@@ -35,6 +35,8 @@ const HALF_SPACING: f64 = 1.0;
 
 /// Maximum change of a site's flow in one call, px: the data term is a linearisation.
 const MAX_FLOW_CHANGE: f64 = 2.0;
+/// Rows of one task, where rows do not depend on each other.
+const ROWS_PER_TASK: usize = 16;
 
 /// Smoothness terms and sweeps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,28 +106,33 @@ fn save_flow<T: SimdReal>(motion: &mut Planes<T>, start: &mut Planes<T>) {
     let (width, height) = (motion.width, motion.height);
     start.reshape(width, height, 2);
     let (stride, rows, kept) = (motion.stride(), motion.row_len(), start.row_len());
-    let pairs = motion.data_mut().par_chunks_mut(rows).zip(start.data_mut().par_chunks_mut(kept));
-    pairs.with_min_len(16).for_each(|(row, kept)| {
-        for plane in row.chunks_exact_mut(stride) {
-            plane[..LEFT].fill(T::from_f64(0.0));
-            plane[LEFT + width..].fill(T::from_f64(0.0));
+    let pairs =
+        motion.data_mut().chunks_mut(ROWS_PER_TASK * rows).zip(start.data_mut().chunks_mut(ROWS_PER_TASK * kept));
+    parallel::for_each(pairs, |(task_rows, task_kept)| {
+        for (row, kept) in task_rows.chunks_mut(rows).zip(task_kept.chunks_mut(kept)) {
+            for plane in row.chunks_exact_mut(stride) {
+                plane[..LEFT].fill(T::from_f64(0.0));
+                plane[LEFT + width..].fill(T::from_f64(0.0));
+            }
+            let flow = kept.len();
+            kept.copy_from_slice(&row[..flow]);
         }
-        let flow = kept.len();
-        kept.copy_from_slice(&row[..flow]);
     });
 }
 
 /// Limits changes of the flow to [`MAX_FLOW_CHANGE`]; returns their root mean square.
 fn limit_change<T: SimdReal>(level: Level, motion: &mut Planes<T>, start: &Planes<T>) -> f64 {
-    let (rows, stride, sites) = (motion.row_len(), motion.stride(), motion.width * motion.height);
-    let rows = motion.data_mut().par_chunks_mut(rows).with_min_len(16).enumerate().map(|(y, row)| {
+    let (len, stride, sites) = (motion.row_len(), motion.stride(), motion.width * motion.height);
+    let row = |(y, row): (usize, &mut [T])| {
         let (u, v) = row[..2 * stride].split_at_mut(stride);
         let (u0, v0) = start.row(y).split_at(stride);
         dispatch(level, LimitChange { now: [u, v], start: [u0, v0] })
+    };
+    let sums = parallel::map(motion.data_mut().chunks_mut(ROWS_PER_TASK * len).enumerate(), |(task, rows)| {
+        (task * ROWS_PER_TASK..).zip(rows.chunks_mut(len)).map(row).collect::<Vec<f64>>()
     });
     // Row by row, so that the sum does not depend on the threads.
-    let sums: Vec<f64> = rows.collect();
-    (sums.iter().sum::<f64>() / sites as f64).sqrt()
+    (sums.iter().flatten().sum::<f64>() / sites as f64).sqrt()
 }
 
 struct LimitChange<'a, T> {

@@ -18,8 +18,8 @@
 use super::Planes;
 use super::relaxation::{PackedRow, relax_row};
 use super::smoothness::{NeighbourRows, SmoothnessProblem, WEIGHTS, update_weights};
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
-use rayon::prelude::*;
 use std::ops::Range;
 
 #[derive(Debug, Default)]
@@ -56,7 +56,7 @@ pub(super) fn sweep<T: SimdReal>(
     let passes = problem.smoothness.sweeps + 1;
     // A wedge reaches `passes` rows into the bands on both sides, and reads one more.
     let deep = passes + 1;
-    let count = rayon::current_num_threads().min(height / (2 * deep)).max(1);
+    let count = parallel::thread_count().min(height / (2 * deep)).max(1);
     let starts: Vec<usize> = (0..=count).map(|i| i * height / count).collect();
     rings.resize_with(rings.len().max(count), Ring::default);
     let run_span = |((rows, weights), span, origin): ((&mut [T], &mut [T]), Span, usize), ring: &mut Ring<T>| {
@@ -69,15 +69,15 @@ pub(super) fn sweep<T: SimdReal>(
         Span { first: band.start + top, last: band.end - bottom, slope: (top as isize, -(bottom as isize)) }
     });
     let parts = cut(motion.data_mut(), len, &bands).into_iter().zip(cut(weights.data_mut(), WEIGHTS * stride, &bands));
-    let work: Vec<_> = parts.zip(spans).zip(&bands).map(|((part, s), b)| (part, s, b.start)).collect();
-    work.into_par_iter().zip(rings.par_iter_mut()).with_max_len(1).for_each(|(part, ring)| run_span(part, ring));
+    let work = parts.zip(spans).zip(&bands).map(|((part, s), b)| (part, s, b.start));
+    parallel::for_each(work.zip(rings.iter_mut()), |(part, ring)| run_span(part, ring));
 
     let wedges: Vec<Range<usize>> = starts[1..count].iter().map(|&s| s - deep..s + deep).collect();
     let spans = starts[1..count].iter().map(|&s| Span { first: s - 1, last: s + 1, slope: (-1, 1) });
     let parts =
         cut(motion.data_mut(), len, &wedges).into_iter().zip(cut(weights.data_mut(), WEIGHTS * stride, &wedges));
-    let work: Vec<_> = parts.zip(spans).zip(&wedges).map(|((part, s), w)| (part, s, w.start)).collect();
-    work.into_par_iter().zip(rings.par_iter_mut()).with_max_len(1).for_each(|(part, ring)| run_span(part, ring));
+    let work = parts.zip(spans).zip(&wedges).map(|((part, s), w)| (part, s, w.start));
+    parallel::for_each(work.zip(rings.iter_mut()), |(part, ring)| run_span(part, ring));
 }
 
 /// The rows in each of some ascending ranges that do not overlap.

@@ -4,8 +4,8 @@ pub(super) mod first_frame;
 pub(super) mod rows;
 
 use super::{data_term::MOTION, planes::LEFT, planes::Planes};
+use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
-use rayon::prelude::*;
 use rows::RowReader;
 
 const ROWS: usize = 32;
@@ -47,7 +47,7 @@ pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, step: f64, x: f64, y: f
 pub(super) fn finer<T: SimdReal>(simd: Level, coarse: &Planes<T>, size: (usize, usize), fine: &mut Planes<T>) {
     fine.reshape(size.0.div_ceil(2), size.1.div_ceil(2), MOTION);
     let (width, stride, len) = (fine.width, fine.stride(), fine.row_len().max(1));
-    fine.data_mut().par_chunks_mut(ROWS * len).enumerate().for_each(|(task, out)| {
+    parallel::for_each(fine.data_mut().chunks_mut(ROWS * len).enumerate(), |(task, out)| {
         dispatch(simd, Finer { coarse, first: task * ROWS, out, len, stride, width });
     });
 }
@@ -100,7 +100,7 @@ pub(super) fn coarser<T: SimdReal>(fine: &Planes<T>, size: (usize, usize), coars
 pub(super) fn rederive<T: SimdReal>(old: &Planes<T>, out: &mut Planes<T>) {
     out.reshape(old.width, old.height, old.count);
     let (stride, len, width) = (out.stride(), out.row_len().max(1), old.width);
-    out.data_mut().par_chunks_mut(ROWS * len).enumerate().for_each(|(task, rows)| {
+    parallel::for_each(out.data_mut().chunks_mut(ROWS * len).enumerate(), |(task, rows)| {
         for (y, row) in (task * ROWS..).zip(rows.chunks_mut(len)) {
             row[..2 * stride].copy_from_slice(&old.row(y)[..2 * stride]);
             for k in 0..2 {

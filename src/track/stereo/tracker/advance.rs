@@ -17,8 +17,8 @@ use super::super::warm_start::{is_left_over, moved};
 use super::{StereoTracker, cluster::Clustered, meeting::arcs, record::Arrival, record::Departure};
 use crate::error::Result;
 use crate::mixture::Posterior;
+use crate::parallel;
 use crate::types::Frame;
-use rayon::prelude::*;
 
 impl StereoTracker {
     /// The paper's step: a new mixture, matching and overlaps forwards and backwards, (29) to (33).
@@ -117,7 +117,7 @@ impl StereoTracker {
         let lost: Vec<bool> = (0..components).map(|k| newcomer(k) || overlap(k) < least && !left_over(k)).collect();
         self.associate_components(&clusters, &lost);
         let shown = View { plain: left, smooth: levels.sharpest() };
-        let middles: Vec<[f64; 2]> = (0..components).into_par_iter().map(|k| own_middle(&clusters, k, shown)).collect();
+        let middles: Vec<[f64; 2]> = parallel::map(0..components, |k| own_middle(&clusters, k, shown));
         let arrivals: Vec<Arrival> = (0..components)
             .map(|k| match own(k) {
                 Some((motion, Carried { coasting, .. })) => {
