@@ -4,11 +4,11 @@ speed of the extension module.
     python -m benchmarks.build [--variants ci "1 unit" ...] [--repeats 9]
 
 Crates that the library depends on are compiled once and left out of the cost, in a folder that is deleted at
-the end. Settings apply to the library alone. Columns: CPU seconds of the compiler on library and binding, of all
-its threads; size of the module, stripped as in the wheel, MB; CPU time of one flow estimate on one thread over
-that of the first variant. The estimates of the variants take turns, and the least time of each counts. Where two
-hardware threads share a core, CPU times nearly double while the other one works: run it on a quiet machine. Needs
-cargo, `strip` and numpy.
+the end. Settings apply to the library alone, without kernels for AVX-512. Columns: CPU seconds of the
+compiler on library and binding, of all its threads; size of the module, stripped as in the wheel, MB; CPU
+time of one flow estimate on one thread over that of the first variant. The estimates of the variants take
+turns, and the least time of each counts. Where two hardware threads share a core, CPU times nearly double
+while the other one works: run it on a quiet machine. Needs cargo, `strip` and numpy.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 VARIANTS: dict[str, list[str]] = {
     "ci": [],
+    "AVX-512": [],
     "1 unit": ["package.jacoflow.codegen-units=1"],
     "16 units": ["package.jacoflow.codegen-units=16"],
     "opt-level 2": ["package.jacoflow.opt-level=2"],
@@ -34,7 +35,7 @@ VARIANTS: dict[str, list[str]] = {
     "lto thin": ["lto='thin'"],
     "lto thin, 1 unit": ["lto='thin'", "package.jacoflow.codegen-units=1"],
 }
-"""What is changed in `[profile.ci]`."""
+"""What is changed in `[profile.ci]`; "AVX-512" has its kernels too, which the check leaves out."""
 ESTIMATE = """
 import time, jacoflow
 frames = jacoflow.scenes.Scene("vortex", width=320, height=240, random_state=1).frames(3)
@@ -56,12 +57,13 @@ def used() -> float:
 def compiled(name: str, scratch: Path) -> tuple[float, float]:
     """CPU seconds of the compiler on library and binding, and MB; leaves the package in a folder of that name."""
     target, into, seconds = scratch / "target", scratch / name, scratch / "seconds"
+    features = "--features=avx512" if name == "AVX-512" else "--no-default-features"
     settings = [part for setting in VARIANTS[name] for part in ("--config", f"profile.ci.{setting}")]
     wrapper = scratch / "wrapper"
     wrapper.write_text(f'#!/bin/sh\nexec "{sys.executable}" "{Path(__file__).resolve()}" --compiler "$@"\n')
     wrapper.chmod(0o755)
     seconds.unlink(missing_ok=True)
-    command = ["cargo", "build", "-q", "--profile", "ci", "-p", "jacoflow-python"]
+    command = ["cargo", "build", "-q", "--profile", "ci", "-p", "jacoflow-python", features]
     subprocess.run(
         [*command, *settings],
         cwd=ROOT,

@@ -28,6 +28,7 @@ const VARIABLE: &str = "JACOFLOW_SIMD";
 enum Inner {
     Scalar,
     Avx2,
+    #[cfg(feature = "avx512")]
     Avx512,
 }
 
@@ -48,9 +49,9 @@ impl Level {
         None
     }
 
-    /// AVX-512 (F, DQ, VL), if the processor has it.
+    /// AVX-512 (F, DQ, VL), if the processor has it and the crate was built with the feature `avx512`.
     pub fn avx512() -> Option<Self> {
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
         if Self::avx2().is_some()
             && std::is_x86_feature_detected!("avx512f")
             && std::is_x86_feature_detected!("avx512dq")
@@ -122,6 +123,7 @@ impl Level {
         match self.0 {
             Inner::Scalar => "scalar",
             Inner::Avx2 => "avx2",
+            #[cfg(feature = "avx512")]
             Inner::Avx512 => "avx512",
         }
     }
@@ -144,10 +146,10 @@ pub(crate) fn dispatch<T: SimdReal, K: Kernel<T>>(level: Level, kernel: K) -> K:
         #[cfg(target_arch = "x86_64")]
         Inner::Avx2 => unsafe { run_avx2(kernel) },
         // SAFETY: a `Level` of this kind exists only on a processor with AVX-512 F, DQ and VL.
-        #[cfg(target_arch = "x86_64")]
+        #[cfg(all(target_arch = "x86_64", feature = "avx512"))]
         Inner::Avx512 => unsafe { run_avx512(kernel) },
         #[cfg(not(target_arch = "x86_64"))]
-        _ => kernel.run::<T>(),
+        _ => unreachable!("other processors have only the scalar level"),
     }
 }
 
@@ -157,7 +159,7 @@ fn run_avx2<T: SimdReal, K: Kernel<T>>(kernel: K) -> K::Output {
     kernel.run::<T::Avx2>()
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", feature = "avx512"))]
 #[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
 fn run_avx512<T: SimdReal, K: Kernel<T>>(kernel: K) -> K::Output {
     kernel.run::<T::Avx512>()
