@@ -81,7 +81,7 @@ def _pales(x: Array, y: Array, half_width: float, half_height: float) -> Array:
 
 
 def _everywhere(x: Array, y: Array, half_width: float, half_height: float) -> Array:
-    return np.full(x.shape, 99.0)
+    return np.full(np.broadcast_shapes(x.shape, y.shape), 99.0)
 
 
 OUTLINES: dict[str, Callable[[Array, Array, float, float], Array]] = {
@@ -136,7 +136,8 @@ class Layer:
         )
 
     def disparity_at(self, x: Array, y: Array, pose: Pose, height: int) -> Array:
-        """Disparity (H, W) in px at places of the layer, in its own px from its centre."""
+        """Disparity (H, W) in px at places of the layer, in its own px from its centre; `x` and `y` may be one
+        row and one column."""
         bulge: Array | float = 0.0
         if self.relief:
             a, b = self.half
@@ -214,25 +215,25 @@ class Scene:
 
     def _step(self, t: int, textures: list[Array], rng: np.random.Generator) -> Step:
         width, height = self.size
-        rows, columns = np.mgrid[:height, :width].astype(float)
+        # One column and one row, as long as a place does not depend on both.
+        rows, columns = np.arange(height, dtype=float)[:, None], np.arange(width, dtype=float)[None]
         left, right = np.zeros((height, width)), np.zeros((height, width))
         top, top_right = np.full((height, width), -1), np.full((height, width), -1)
         disparity, motion = np.zeros((height, width)), np.zeros((height, width, 3))
         for index, (layer, cover) in enumerate(zip(self.layers, textures, strict=True)):
             now, then = layer.pose(t), layer.pose(t + 1)
             part = layer.part(now, self.size)
-            x, y = columns[part], rows[part]
+            x, y = columns[:, part[1]], rows[part[0]]
             p, q = (x - now.x) / now.scale, (y - now.y) / now.scale
             _paint(left[part], top[part], index, layer, cover, p, q)
             mine, depth = top[part] == index, layer.disparity_at(p, q, now, height)
             moved = layer.disparity_at(p, q, then, height) - depth
             disparity[part][mine] = depth[mine]
-            motion[part][mine] = np.stack(
-                [then.x + then.scale * p - x, then.y + then.scale * q - y, moved], axis=-1
-            )[mine]
+            for k, shift in enumerate((then.x + then.scale * p - x, then.y + then.scale * q - y, moved)):
+                motion[part][..., k][mine] = np.broadcast_to(shift, mine.shape)[mine]
             # A pixel of the right view shows the point whose x_left - d(x_left) it is.
             part = layer.part(now, self.size, self.row_offset, layer.disparities(now, height))
-            x, y = columns[part], rows[part]
+            x, y = columns[:, part[1]], rows[part[0]]
             q, x_left = (y - self.row_offset - now.y) / now.scale, x + now.disparity
             # Without a relief, disparity does not depend on where along the row a point is.
             for _ in range(8 if layer.relief else 1):
@@ -248,8 +249,12 @@ def _paint(
     view: Array, top: NDArray[np.int_], index: int, layer: Layer, cover: Array, p: Array, q: Array
 ) -> None:
     """Lays one more layer over a part of the view, in place; marks in `top` where it is."""
+    places = np.broadcast_arrays(q + cover.shape[0] / 2, p + cover.shape[1] / 2)
+    shown = map_coordinates(cover, places, order=1, mode="reflect")
+    if layer.outline == "all":
+        top[:], view[:] = index, shown
+        return
     alpha = np.clip(OUTLINES[layer.outline](p, q, *layer.half) / SOFT_EDGE + 0.5, 0, 1)
-    shown = map_coordinates(cover, [q + cover.shape[0] / 2, p + cover.shape[1] / 2], order=1, mode="reflect")
     top[alpha > 0.5] = index
     view[:] = view * (1 - alpha) + shown * alpha
 
@@ -259,7 +264,7 @@ def _seen_by_both(
 ) -> NDArray[np.bool_]:
     """Where the right view shows the same layer at the place of the match."""
     height, width = top.shape
-    rows, columns = np.mgrid[:height, :width].astype(float)
+    rows, columns = np.arange(height)[:, None], np.arange(width)
     x, y = np.rint(columns - disparity).astype(int), np.rint(rows + row_offset).astype(int)
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
     return inside & (top_right[y.clip(0, height - 1), x.clip(0, width - 1)] == top)

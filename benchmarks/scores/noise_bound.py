@@ -18,13 +18,11 @@ WINDOWS = (3.0, 4.5, 6.5, 9.0, 12.5, 18.0, 27.0)
 """Windows to choose from, px."""
 
 
-def moments(plane: Array, weights: Array, offsets: Array, power_x: int, power_y: int) -> Array:
-    """`sum_d weight(dx) weight(dy) dx^power_x dy^power_y plane(p + d)` at every pixel p; nothing lies
-    beyond the edge."""
+def moments(plane: Array, weights: Array, offsets: Array, power: int, axis: int) -> Array:
+    """`sum_d weight(d) d^power plane(p + d)` at every pixel p along one axis; nothing lies beyond the edge."""
     from scipy.ndimage import correlate1d
 
-    along_x = correlate1d(plane, weights * offsets**power_x, axis=1, mode="constant")
-    return correlate1d(along_x, weights * offsets**power_y, axis=0, mode="constant")
+    return correlate1d(plane, weights * offsets**power, axis=axis, mode="constant")
 
 
 def normal_matrix(gradient: Array, weights: Array, offsets: Array) -> Array:
@@ -35,14 +33,17 @@ def normal_matrix(gradient: Array, weights: Array, offsets: Array) -> Array:
     """
     products = {(i, j): gradient[..., i] * gradient[..., j] for i in (0, 1) for j in (0, 1)}
     powers = [(0, 0), (1, 0), (0, 1)]
+    along_x: dict[tuple[int, ...], Array] = {}
     known: dict[tuple[int, ...], Array] = {}
     matrix = np.empty((*gradient.shape[:2], 6, 6))
     for i in range(6):
         for j in range(6):
             (ix, iy), (jx, jy) = powers[i // 2], powers[j // 2]
             key = (min(i % 2, j % 2), max(i % 2, j % 2), ix + jx, iy + jy)
+            if key[:3] not in along_x:
+                along_x[key[:3]] = moments(products[key[0], key[1]], weights, offsets, key[2], 1)
             if key not in known:
-                known[key] = moments(products[key[0], key[1]], weights, offsets, key[2], key[3])
+                known[key] = moments(along_x[key[:3]], weights, offsets, key[3], 0)
             matrix[..., i, j] = known[key]
     return matrix
 

@@ -38,7 +38,11 @@ def tracks(first: Array, second: Array) -> tuple[Array, Array]:
     return points, end.reshape(-1, 2)[good].astype(float) - points
 
 
-def medians(data: Path) -> list[Row]:
+def medians(
+    data: Path,
+    presets: Sequence[str] = ("fast", "balanced"),
+    methods: Sequence[str] = tuple(rivals.METHODS),
+) -> list[Row]:
     """Median errors over all pairs of the drive, and over those whose truth was measured; of these also the
     mean offset of the direction, to the right and down, and the scatter about it.
 
@@ -57,7 +61,7 @@ def medians(data: Path) -> list[Row]:
 
     for index in range(len(images) - 1):
         u, w, shift, turn = true_motion(poses, index)
-        for preset in ("fast", "balanced"):
+        for preset in presets:
             found, _ = motion3d.estimate_field_motion(
                 field(images[index], images[index + 1], preset), K_DRIVE
             )
@@ -66,8 +70,8 @@ def medians(data: Path) -> list[Row]:
         if rivals.cv2 is None:
             continue
         points, flow = tracks(images[index], images[index + 1])
-        for name, method in rivals.METHODS.items():
-            direction, rotation = rivals.two_view(points, flow, K_DRIVE, 0.5, method)
+        for name in methods:
+            direction, rotation = rivals.two_view(points, flow, K_DRIVE, 0.5, rivals.METHODS[name])
             add(
                 f"{name} on LK tracks",
                 direction,
@@ -139,24 +143,28 @@ def summary(given: list[float | None]) -> dict[str, float | str]:
 
 
 def spacings(
-    data: Path, spacings: Sequence[int] = SPACINGS, presets: Sequence[str] = ("fast", "balanced")
+    data: Path,
+    spacings: Sequence[int] = SPACINGS,
+    presets: Sequence[str] = ("fast", "balanced"),
+    every: int = 1,
+    independent: Sequence[str] = tuple(HALVES),
 ) -> list[Row]:
     """Whether motions of two halves of the image differ by what both covariances say, for dense and sparse
     points.
 
     Of true covariances the mean is 1, the median 0.87 and the share 0.95. Beside them the same with points
-    taken for independent. Errors that all flow of an image has in common are in both halves and do not count.
+    taken for independent, for the halves in `independent`. Of all pairs one in `every` is used. Errors that all flow of an image has in common are in both halves and do not count.
     Halves of few points are often `few_points`; they do not count either.
     """
     images, _ = drive(data)
     rows: list[Row] = []
     for preset in presets:
-        fields = [field(*images[index : index + 2], preset) for index in range(len(images) - 1)]
+        fields = [field(*images[index : index + 2], preset) for index in range(0, len(images) - 1, every)]
         length = fields[0].correlation_length
         for spacing in spacings:
             taken = [_motion3d_field_points(flow, float(spacing), None, None) for flow in fields]
             for name, split in HALVES.items():
-                correlated, independent = [], []
+                correlated, alone = [], []
                 for points, vectors, covariances, (_, shared, *_) in taken:
                     first = split(*points.T)
                     correlated.append(
@@ -169,7 +177,8 @@ def spacings(
                             correlation_length=length,
                         )
                     )
-                    independent.append(halves_apart(points, vectors, covariances / shared, first))
+                    if name in independent:
+                        alone.append(halves_apart(points, vectors, covariances / shared, first))
                 row: Row = {
                     "flow": preset,
                     "spacing, px": spacing,
@@ -177,9 +186,9 @@ def spacings(
                     "halves": name,
                     "pairs": len(taken),
                 }
-                row |= summary(correlated) | {
-                    f"{key}, taken for independent": value for key, value in summary(independent).items()
-                }
+                row |= summary(correlated)
+                if name in independent:
+                    row |= {f"{key}, taken for independent": value for key, value in summary(alone).items()}
                 rows.append(row)
     return rows
 

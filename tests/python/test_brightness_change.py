@@ -58,7 +58,7 @@ def test_equal_frames_are_taken_as_they_are():
 
 
 def test_a_few_saturated_pixels_change_nothing_elsewhere():
-    for seed in range(3):
+    for seed in range(2):
         clean, spoilt, far = scenes.specks(seed)
         one, other = jacoflow.flow(*clean), jacoflow.flow(*spoilt)
         std = np.stack([one.std("u"), one.std("v")], axis=-1)

@@ -102,14 +102,14 @@ def test_a_fork_amid_the_work_of_another_thread():
 
 @needs_fork
 def test_an_estimator_is_carried_on_in_a_child():
-    frames = sequence(6)
+    frames = sequence(4)
     for make in (lambda: jacoflow.FlowEstimator(method="windowed"), jacoflow.FlowFilter):
         estimator = make()
-        for frame in frames[:4]:
+        for frame in frames[:3]:
             estimator.push(frame)
 
         def rest(estimator=estimator):
-            return digest(*(estimator.push(frame).flow for frame in frames[4:]))
+            return digest(*(estimator.push(frame).flow for frame in frames[3:]))
 
         assert in_child(rest) == rest()
 

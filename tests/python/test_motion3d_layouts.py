@@ -4,9 +4,12 @@ import pytest
 
 from motion3d_support import layouts
 
-TRIALS = 300
-FEWER = {"a ring": 150, "three lines": 200, "a thing that moves by itself, robust, axes of the noise 100 to 1": 150, "two views, plane, noise 0.05 of the displacement": 200}
-"""Trials of rows that are farther from their bounds than the others, or cost more."""
+TRIALS = 150
+OTHERS = {
+    **dict.fromkeys(["a ring", "three lines", "a thing that moves by itself, robust, axes of the noise 100 to 1", "two views, plane, noise 0.05 of the displacement"], 100),
+    **dict.fromkeys(["a plane, axes of the noise 100 to 1", "two views, cloud, noise 0.3 of the displacement"], 200),
+}
+"""Fewer trials of rows that are farther from their bounds than the others, or cost more; more of those that are seldom `ok`."""
 LESS = (
     *("all over the picture", "a corner", "two clusters"),
     *("noise 5 to 1", " 1 to 1", "10 to 1", "20 to 1", "30 to 1", "50 to 1"),
@@ -18,14 +21,14 @@ ROWS = {part: [name for name in layouts.cases([part]) if not name.endswith(LESS)
 
 def coverage_of(name: str) -> dict:
     """The row, with its counts as shares of its trials."""
-    row = layouts.coverage_row(name, FEWER.get(name, TRIALS))
+    row = layouts.coverage_row(name, OTHERS.get(name, TRIALS))
     return {**row, "ok": row["ok"] / row["trials"], "wrong": row["wrong"] / row["trials"], "wrong of ok": row["wrong"] / row["ok"]}
 
 
 @pytest.mark.parametrize("name", ROWS["layouts"] + ROWS["noise"])
 def test_points_and_noise_of_any_layout_and_shape(name):
     row = coverage_of(name)
-    assert row["ok"] >= 0.3 and row["wrong"] <= 2 / 300 and 0.89 <= row["ellipsoid"] <= 0.98, row
+    assert row["ok"] >= 0.3 and row["wrong"] <= 1 / 150 and 0.89 <= row["ellipsoid"] <= 0.98, row
 
 
 @pytest.mark.parametrize("name", ROWS["things"])
@@ -44,7 +47,7 @@ def test_another_motion_of_a_plane_is_reported_in_any_noise(name):
 
 
 def test_minima_that_are_narrow_in_a_wide_picture_are_found():
-    """Two in 300 are a coin toss between motions that explain the flow alike."""
+    """One in 150 is a coin toss between motions that explain the flow alike."""
     (name,) = layouts.cases(["band"])
     row = coverage_of(name)
     assert row["ok"] >= 2 / 3 and row["wrong"] <= 0.01 and 0.88 <= row["ellipsoid"] <= 0.97, row

@@ -178,11 +178,11 @@ def test_few_points_that_stand_still_are_reported(turn):
 
 
 HARD = {
-    "long lens, half width .15 to .2": (150, 0.3),
-    "a thing that moves by itself, robust": (120, 0.5),
-    "20 to 60 points, outliers, noise not told": (200, 0.3),
-    "6 patches with Jacobians": (200, 0.3),
-    "30 patches with Jacobians": (200, 0.3),
+    "long lens, half width .15 to .2": (100, 0.3),
+    "a thing that moves by itself, robust": (80, 0.5),
+    "20 to 60 points, outliers, noise not told": (100, 0.3),
+    "6 patches with Jacobians": (140, 0.3),
+    "30 patches with Jacobians": (100, 0.3),
 }
 """Rows of the benchmark, numbers of scenes, and the share that is `ok` at least. Ten patches are estimated as six are."""
 
@@ -196,17 +196,18 @@ def test_covariances_hold_where_they_are_hard_to_state(name):
 
 
 def test_what_is_said_of_scenes_by_chance_holds():
-    """No published scene among them."""
-    rows = {row["scenes"]: row for row in honesty.table(1200)}
-    assert rows["all"]["ok"] > 1000 and rows["all"]["wrong"] <= 3
+    """No published scene among them. Of 600 scenes the bounds are two deviations from 95 %, of the 150 to 200 of a class, too."""
+    rows = {row["scenes"]: row for row in honesty.table(600)}
+    assert rows["all"]["ok"] > 500 and rows["all"]["wrong"] <= 1
+    assert 0.93 < rows["all"]["holds"] < 0.97, rows["all"]
     for row in rows.values():
-        assert 0.9 < row["holds"] < 0.97, row
+        assert 0.91 < row["holds"] < 0.985, row
 
 
 def test_a_robust_search_says_as_much_of_scenes_by_chance():
     """So few are not counted by class; `benchmarks.tables.motion3d_honesty --robust` has thousands."""
-    *_, everything = honesty.table(240, robust=True)
-    assert everything["ok"] > 200 and everything["wrong"] == 0 and everything["holds"] > 0.9, everything
+    *_, everything = honesty.table(120, robust=True)
+    assert everything["ok"] > 100 and everything["wrong"] == 0 and everything["holds"] > 0.9, everything
 
 
 def test_times_on_the_sphere_times_the_bearings_z_reach_the_camera_plane():
