@@ -101,11 +101,13 @@ def told(truth: Truth, clustering: Clustering) -> dict[int, Cluster]:
     out = {}
     labels = truth.label[clustering.rows, clustering.columns]
     motions = truth.motion[clustering.rows, clustering.columns]
-    for component in np.unique(clustering.component):
-        mine = clustering.component == component
+    # Pixels by component, in their order.
+    order = np.argsort(clustering.component, kind="stable")
+    components, begins = np.unique(clustering.component[order], return_index=True)
+    for component, mine in zip(components, np.split(order, begins[1:]), strict=True):
         values, counts = np.unique(labels[mine], return_counts=True)
         major = values[np.argmax(counts)]
-        right = mine & (labels == major)
+        right = mine[labels[mine] == major]
         motion = np.median(motions[right], axis=0)
         share = float(counts.max() / counts.sum())
         rows, columns = clustering.rows[right], clustering.columns[right]
@@ -113,7 +115,7 @@ def told(truth: Truth, clustering: Clustering) -> dict[int, Cluster]:
         offsets = np.stack([columns - place[0], rows - place[1], np.ones(len(rows))], axis=1)
         motion_at = np.linalg.lstsq(offsets, motions[right], rcond=None)[0]
         out[int(component)] = Cluster(
-            int(major), share, int(mine.sum()), rows, columns, motion, place, motion_at
+            int(major), share, len(mine), rows, columns, motion, place, motion_at
         )
     return out
 
@@ -124,6 +126,7 @@ class Scores:
     def __init__(self, truths: Sequence[Truth], clusterings: Sequence[Clustering], graph: Graph) -> None:
         self.truths, self.clusterings, self.graph = truths, clusterings, graph
         self.told = [told(*step) for step in zip(truths, clusterings, strict=True)]
+        self._seen: dict[int, list[bool]] = {}
 
     def purity(self) -> float:
         """Share of edge pixels in clusters of their own majority label."""
@@ -132,8 +135,10 @@ class Scores:
 
     def seen(self, label: int) -> list[bool]:
         """At which steps enough of an object is visible."""
-        areas = [int((truth.label == label).sum()) for truth in self.truths]
-        return [area >= VISIBLE * max(areas) for area in areas]
+        if label not in self._seen:
+            areas = [int((truth.label == label).sum()) for truth in self.truths]
+            self._seen[label] = [area >= VISIBLE * max(areas) for area in areas]
+        return self._seen[label]
 
     def recall(self, label: int) -> float:
         """Share of an object's edge pixels in clusters where it is the majority, over the steps at which
@@ -144,8 +149,11 @@ class Scores:
         ):
             if seen:
                 mine = truth.label[clustering.rows, clustering.columns] == label
-                major = np.array([clusters[int(k)].label == label for k in clustering.component[mine]], bool)
-                right, all_ = right + int(major.sum()), all_ + int(mine.sum())
+                components, counts = np.unique(clustering.component[mine], return_counts=True)
+                right += sum(
+                    int(n) for k, n in zip(components, counts, strict=True) if clusters[int(k)].label == label
+                )
+                all_ += int(mine.sum())
         return right / max(1, all_)
 
     def first_hidden(self, label: int) -> int:
@@ -256,7 +264,8 @@ class Scores:
             if time == 0 or not seen:
                 continue
             mine = truth.label[clustering.rows, clustering.columns] == label
-            groups = np.array([self.graph.nodes[time, int(k)].group for k in clustering.component])
+            components, places = np.unique(clustering.component, return_inverse=True)
+            groups = np.array([self.graph.nodes[time, int(k)].group for k in components])[places]
             _, of_clusters = np.unique(clustering.component[mine], return_counts=True)
             names, of_groups = np.unique(groups[mine], return_counts=True)
             if len(of_groups):

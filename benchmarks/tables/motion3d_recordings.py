@@ -42,9 +42,10 @@ def medians(
     data: Path,
     presets: Sequence[str] = ("fast", "balanced"),
     methods: Sequence[str] = tuple(rivals.METHODS),
+    begin: int = 0,
 ) -> list[Row]:
-    """Median errors over all pairs of the drive, and over those whose truth was measured; of these also the
-    mean offset of the direction, to the right and down, and the scatter about it.
+    """Median errors over all pairs of the drive from `begin` on, and over those whose truth was measured; of
+    these also the mean offset of the direction, to the right and down, and the scatter about it.
 
     An offset that every method shows, on flow of every kind, is one of the reference: of how the camera
     stands to what the poses were measured with.
@@ -59,7 +60,7 @@ def medians(
             (angle(direction, true_direction), float(np.degrees(turned)), *off)
         )
 
-    for index in range(len(images) - 1):
+    for index in range(begin, len(images) - 1):
         u, w, shift, turn = true_motion(poses, index)
         for preset in presets:
             found, _ = motion3d.estimate_field_motion(
@@ -82,9 +83,10 @@ def medians(
         add("jacoflow on LK tracks", found.translation, u, float(np.linalg.norm(found.rotation - w)))
         ok["jacoflow on LK tracks"] += found.status == "ok"
     rows: list[Row] = []
+    measured_from = max(0, INTERPOLATED - begin)
     for name, values in errors.items():
-        every, third, measured = (np.median(part, 0) for part in (values, values[::3], values[INTERPOLATED:]))
-        offsets = np.array(values)[INTERPOLATED:, 2:]
+        every, third, measured = (np.median(part, 0) for part in (values, values[::3], values[measured_from:]))
+        offsets = np.array(values)[measured_from:, 2:]
         mean, scatter = offsets.mean(0), offsets.std(0, ddof=1)
         rows.append(
             {
@@ -153,8 +155,9 @@ def spacings(
     points.
 
     Of true covariances the mean is 1, the median 0.87 and the share 0.95. Beside them the same with points
-    taken for independent, for the halves in `independent`. Of all pairs one in `every` is used. Errors that all flow of an image has in common are in both halves and do not count.
-    Halves of few points are often `few_points`; they do not count either.
+    taken for independent, for the halves in `independent`. Of all pairs one in `every` is used. Errors that
+    all flow of an image has in common are in both halves and do not count. Halves of few points are often
+    `few_points`; they do not count either.
     """
     images, _ = drive(data)
     rows: list[Row] = []

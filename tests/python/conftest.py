@@ -6,7 +6,10 @@ import pytest
 from jacoflow import scenes
 
 # Those that take longest begin, so that no process works on one of them when all others are through.
-SLOWEST = ["test_stereo_track_scenes", "test_motion3d_tables", "test_track_limits", "test_motion3d_layouts", "test_track_covered", "test_motion3d_points", "test_motion3d_six", "test_motion3d_theory", "test_fork"]
+SLOWEST = [
+    *("test_stereo_track_scenes", "test_motion3d_tables", "test_motion3d_points", "test_motion3d_layouts", "test_motion3d_recordings"),
+    *("test_track_limits", "test_motion3d_six", "test_accuracy", "test_calibration", "test_fork"),
+]
 
 METHODS = ["windowed", "coarse_to_fine", "instantaneous", "lucas_kanade", "horn_schunck"]
 

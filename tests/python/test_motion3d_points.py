@@ -196,7 +196,7 @@ def test_covariances_hold_where_they_are_hard_to_state(name):
 
 
 def test_what_is_said_of_scenes_by_chance_holds():
-    """No published scene among them. Of 600 scenes the bounds are two deviations from 95 %, of the 150 to 200 of a class, too."""
+    """No published scene among them. The bounds are two deviations from 95 %: of 600 scenes, and of the 150 to 200 of a class."""
     rows = {row["scenes"]: row for row in honesty.table(600)}
     assert rows["all"]["ok"] > 500 and rows["all"]["wrong"] <= 1
     assert 0.93 < rows["all"]["holds"] < 0.97, rows["all"]

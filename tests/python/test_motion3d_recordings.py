@@ -12,9 +12,29 @@ from benchmarks.tables import motion3d_recordings as recordings
 DATA = Path(os.environ.get("JACOFLOW_DATA", "/nonexistent"))
 
 
+@pytest.fixture(scope="module")
+def remembered():
+    """Flow takes longer than all else: both tests of the drive look at some of the same pairs."""
+    known, compute = {}, recordings.field
+
+    def field(first, second, preset):
+        if preset != "balanced":
+            return compute(first, second, preset)
+        key = first.tobytes(), second.tobytes()
+        if key not in known:
+            known[key] = compute(first, second, preset)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recordings, "field", field)
+        yield
+
+
+@pytest.mark.usefixtures("remembered")
 @pytest.mark.skipif(not (DATA / "kitti_odometry").is_dir(), reason="no recordings")
 def test_a_drive_is_better_than_five_points_on_tracks():
-    rows = {str(row["method"]): row for row in recordings.medians(DATA, ("balanced",), ("5-point RANSAC",))}
+    """Four pairs before the reference was measured, and all with a measured one."""
+    rows = {str(row["method"]): row for row in recordings.medians(DATA, ("balanced",), ("5-point RANSAC",), begin=8)}
     ours = rows["jacoflow, balanced flow"]
     assert ours["direction, deg"] < 0.6
     assert float(str(ours["pairs with measured truth"]).split(" / ")[1]) < 0.06
@@ -22,6 +42,7 @@ def test_a_drive_is_better_than_five_points_on_tracks():
         assert ours["direction, deg"] < rows["5-point RANSAC on LK tracks"]["direction, deg"]
 
 
+@pytest.mark.usefixtures("remembered")
 @pytest.mark.skipif(not (DATA / "kitti_odometry").is_dir(), reason="no recordings")
 def test_halves_of_the_picture_differ_by_what_their_covariances_say():
     """Ten pairs and four ways to halve: of 9 that are right, two outside of 95 % ellipsoids by chance are rarer than one in ten."""

@@ -13,7 +13,7 @@ from jacoflow import motion3d
 
 
 TRIALS = {0: 60, 3: 150, 7: 100}
-"""Rows of the table of scenes: points by chance, a smooth scene, the ground; and how many trials they take. Errors of the smooth scene scatter most."""
+"""Rows of the table of scenes: points by chance, a smooth scene, the ground; and trials: errors of the smooth scene scatter most."""
 GAINS = (3, 7)
 """Those in which smoothed weights are worth a quarter of the error and more."""
 TRUSTED = {0: 0.9, 3: 0.8, 7: 0.95}
