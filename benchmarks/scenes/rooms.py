@@ -4,7 +4,7 @@ moves between two frames."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class Room:
     def picture(self, second: bool) -> Array:
         """What the camera sees, without noise."""
         rotation, shift = (self.rotation, self.shift) if second else (np.eye(3), np.zeros(3))
-        rays, centre = _rays(_pixels()) @ rotation, -rotation.T @ shift
+        rays, centre = _pixel_rays() @ rotation, -rotation.T @ shift
         along, wall = self._hits(rays, centre)
         places = (centre + along[:, None] * rays) @ self.pose.T * TEXELS + WALL / 2
         shade = np.empty(len(places))
@@ -75,6 +75,11 @@ class Room:
 def _pixels() -> Array:
     y, x = np.mgrid[: SIZE[0], : SIZE[1]]
     return np.stack([x, y], axis=-1).reshape(-1, 2).astype(float)
+
+
+@cache
+def _pixel_rays() -> Array:
+    return _rays(_pixels())
 
 
 def _rays(points: Array) -> Array:
