@@ -183,7 +183,7 @@ fn six_to_twenty_patches_determine_the_motion_and_say_how_surely() {
     let options = MotionOptions { placement: Placement::Start, ..MotionOptions::default() };
     for (size, number, most) in [(60, 20, 0.8), (100, 6, 2.2)] {
         let (mut ok, mut held, mut sum, mut errors) = (0, 0, 0.0, Vec::new());
-        for seed in 0..24 {
+        for seed in 0..12 {
             let patches = field_patches(&drive(&truth, seed), size, None).unwrap();
             assert_eq!(patches.points.len(), number);
             let found = estimate_patch_motion(&patches.seen_by(&camera()), &options).unwrap();
@@ -194,10 +194,10 @@ fn six_to_twenty_patches_determine_the_motion_and_say_how_surely() {
             sum += square;
         }
         errors.sort_by(f64::total_cmp);
-        assert!(ok >= 20 && held >= 22 && errors[12] < most, "{size}: {held} of {ok}, {}", errors[12]);
+        assert!(ok >= 10 && held >= 11 && errors[6] < most, "{size}: {held} of {ok}, {}", errors[12]);
         // This noise has no tail, so that the area over which it is one is smaller than the one that is
         // reckoned with.
-        let mean = sum / 24.0 / 5.0 * AREA / (4.0 * std::f64::consts::PI);
+        let mean = sum / 12.0 / 5.0 * AREA / (4.0 * std::f64::consts::PI);
         assert!((0.4..2.2).contains(&mean), "{size}: {mean}");
     }
 }

@@ -9,7 +9,8 @@ use jacoflow::synth::{AffineTexture, Scene, Sensor};
 use jacoflow::temporal::{FlowStream, RecursiveFusion, RecursiveOptions, StreamPlan};
 use jacoflow::types::{AnyFrame, FlowField, Frame, Rect, SamplingGrid, Status};
 use nalgebra::{Matrix6, Vector6};
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
 
 const SIDE: usize = 88;
 const REST: [f64; 6] = [0.0; 6];
@@ -35,11 +36,19 @@ fn coarse_to_fine(frames: usize) -> Method {
     Method::CoarseToFine(CoarseToFineOptions { frames, ..CoarseToFineOptions::default() })
 }
 
+/// The scene at a time, drawn once.
+fn picture(motion: [f64; 6], time: usize) -> Arc<Frame<f64>> {
+    type Drawn = BTreeMap<([u64; 6], usize), Arc<Frame<f64>>>;
+    static DRAWN: Mutex<Drawn> = Mutex::new(BTreeMap::new());
+    let draw = || AffineTexture::moving((SIDE, SIDE), motion, 5).unwrap().frame(time as f64);
+    let mut drawn = DRAWN.lock().unwrap();
+    Arc::clone(drawn.entry((motion.map(f64::to_bits), time)).or_insert_with(|| Arc::new(draw())))
+}
+
 /// What an 8-bit camera sees at these times.
 fn seen(motion: [f64; 6], noise: f64, times: impl Iterator<Item = usize>, seed: u64) -> Vec<Arc<Frame<f32>>> {
-    let scene = AffineTexture::moving((SIDE, SIDE), motion, 5).unwrap();
     let camera = Sensor::eight_bit(noise, seed);
-    let frame = |(k, t): (usize, usize)| camera.apply(&scene.frame(t as f64), k as u64).map(|&v| v as f32);
+    let frame = |(k, t): (usize, usize)| camera.apply(&picture(motion, t), k as u64).map(|&v| v as f32);
     times.enumerate().map(frame).map(Arc::new).collect()
 }
 
@@ -157,7 +166,7 @@ fn a_stream_shows_its_errors_down_to_the_floor() {
 /// Noise of consecutive estimates, which the fusion takes for independent: correlated negatively, if at all.
 #[test]
 fn shared_frames_correlate_errors_negatively() {
-    const REALISATIONS: u64 = 6;
+    const REALISATIONS: u64 = 4;
     const COUNT: usize = 12;
     for (name, method, motion) in [
         ("windowed", windowed(), REST),

@@ -110,7 +110,7 @@ fn one_spoilt_frame_is_reported_and_forgotten_within_ten() {
     for profile in ["measured", "patent"] {
         for event in [Event::Black, Event::Bright, Event::Flash, Event::Dropped, Event::Repeated] {
             for (seed, carrier) in [(111, "noise"), (112, "speckle"), (113, "particles")] {
-                let scores = Sequence::new(carrier, (0.5, -0.4), seed, event).scores(profile, SPOILT + 20);
+                let scores = Sequence::new(carrier, (0.5, -0.4), seed, event).scores(profile, SPOILT + 14);
                 let is_lost = |(error, _): &SiteScore| error[..2].iter().any(|&e| e >= 3.0);
                 let usual = share(&scores[SPOILT - 1].1, is_lost) + 0.05;
                 for (t, sites) in &scores[SPOILT..] {
