@@ -15,21 +15,22 @@ ASSERTED := --config profile.ci.package.jacoflow.opt-level=0 --config profile.ci
 
 .PHONY: fuzz test checks of-rust of-python demo format clippy features rustdoc rust-test guide wheel packages install pytest stubtest typing examples develop docs compare readme ablation clean
 
-# Two steps at a time, each of which often leaves a core idle; each prints when it ends. What is only checked is
-# built in the development profile, whose folder cargo locks apart from that of the wheel.
+# The compiler often leaves a core idle: what is only checked, in the development profile, whose folder cargo locks
+# apart from that of the wheel, takes what the wheel and its tests leave. Each prints when it ends.
 test: format $(BIN)/maturin
-	@$(MAKE) --no-print-directory -j2 -Otarget wheel checks
-	@$(MAKE) --no-print-directory -j2 -Otarget of-rust of-python
+	@$(MAKE) --no-print-directory -j3 -Otarget of-rust of-python checks
 	@echo "everything passed"
 
-checks:
-	@for step in typing clippy features guide rustdoc; do CARGO_INCREMENTAL=0 $(MAKE) --no-print-directory $$step || exit 1; done
+of-rust: wheel
+	@$(MAKE) --no-print-directory rust-test
 
-of-rust: rust-test
-
-of-python:
+of-python: wheel packages
 	@$(MAKE) --no-print-directory -o wheel -o packages install
 	@for step in pytest stubtest examples; do $(MAKE) --no-print-directory -o install $$step || exit 1; done
+
+checks: packages
+	@for step in typing clippy features guide rustdoc; do \
+		CARGO_INCREMENTAL=0 nice $(MAKE) --no-print-directory -o packages $$step || exit 1; done
 
 # The main job on an embedded example.
 demo:

@@ -252,13 +252,13 @@ mod tests {
     fn a_part_with_another_rotation_pulls_apart_and_noise_does_not() {
         let all: Vec<u32> = (0..400).collect();
         let (mut chance, mut found) = (0, 0);
-        for seed in 0..200 {
+        for seed in 0..80 {
             let mut scene = Scene::oblique(400, 0.02, seed);
             chance += u32::from(deviating_parts(&scene.observations(), &oblique(), &all).is_some());
             turn_a_part(&mut scene);
             found += u32::from(deviating_parts(&scene.observations(), &oblique(), &all).is_some());
         }
-        assert!(chance <= 50 && found >= 190, "{chance} {found}");
+        assert!(chance <= 20 && found >= 76, "{chance} {found}");
     }
 
     #[test]
