@@ -54,9 +54,13 @@ pub fn read_flo(path: impl AsRef<Path>) -> Result<FlowImage> {
     };
     check_size(path, width, height)?;
     let (needed, mut data) = (8 * width * height, Vec::new());
-    file.take(needed as u64).read_to_end(&mut data).map_err(|e| Error::io(path, e))?;
+    // One byte more shows a header that does not fit.
+    file.take(needed as u64 + 1).read_to_end(&mut data).map_err(|e| Error::io(path, e))?;
     if data.len() < needed {
         return Err(Error::format(path, format!("cut off: {} of {needed} bytes of flow", data.len())));
+    }
+    if data.len() > needed {
+        return Err(Error::format(path, format!("longer than a field of {width} x {height} px, as its header says")));
     }
     let known = |(u, v): (f32, f32)| {
         let good = u.abs() <= UNKNOWN_ABOVE && v.abs() <= UNKNOWN_ABOVE;

@@ -27,6 +27,9 @@ fn broken_files_are_format_errors() {
         std::fs::write(&path, &whole[..cut]).unwrap();
         assert!(matches!(read_flo(&path), Err(Error::Format { .. })), "{cut}");
     }
+    std::fs::write(&path, [&whole[..], &[0; 8]].concat()).unwrap();
+    let error = read_flo(&path).unwrap_err().to_string();
+    assert!(error.contains("longer than a field of 3 x 2 px"), "{error}");
     for size in [[0u8; 8], [0xff; 8], [0xff, 0xff, 0, 0, 0xff, 0xff, 0, 0]] {
         std::fs::write(&path, [&whole[..4], &size, &whole[12..]].concat()).unwrap();
         assert!(matches!(read_flo(&path), Err(Error::Format { .. })), "{size:?}");

@@ -37,6 +37,20 @@ fn a_folder_is_read_in_natural_order_and_other_files_are_left_out() {
 }
 
 #[test]
+#[cfg(unix)]
+fn a_frame_that_leads_nowhere_is_not_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    for i in [1u8, 3] {
+        grey(i).save(folder.path().join(format!("frame{i}.png"))).unwrap();
+    }
+    std::os::unix::fs::symlink("not-fetched", folder.path().join("frame2.png")).unwrap();
+    for spec in [folder.path().to_path_buf(), folder.path().join("frame*.png")] {
+        let error = open(&spec.to_string_lossy(), &OpenOptions::default()).map(|_| ()).unwrap_err();
+        assert!(error.to_string().contains("frame2.png"), "{error}");
+    }
+}
+
+#[test]
 fn numbers_of_any_padding_are_compared_by_their_value() {
     let folder = tempfile::tempdir().unwrap();
     let names = ["f.png", "f0.png", "f1.png", "f01.png", "f001b2.png", "f1b10.png", "f009.png", "f10.png", "f0100.png"];

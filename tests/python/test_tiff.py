@@ -203,6 +203,15 @@ def test_compression(compression, layout, dtype, tmp_path):
     assert_array_equal(got, values)
 
 
+@pytest.mark.parametrize("dtype", ["uint8", "uint16"])
+def test_tiles_of_noise_in_lzw_that_reach_beyond_the_picture(dtype, tmp_path):
+    for seed in range(30):
+        shape = (37 + seed, 53 + 7 * seed)
+        values = np.random.default_rng(seed).integers(0, 256, shape).astype(dtype)
+        tifffile.imwrite(tmp_path / "s.tif", values, photometric="minisblack", compression="lzw", tile=(16, 32))
+        assert_array_equal(read(tmp_path / "s.tif")[0], values)
+
+
 @pytest.mark.parametrize("compression", ["zstd", "lzma"])
 def test_damage_in_compressed_files_is_an_error(compression, tmp_path):
     path = tmp_path / "s.tif"

@@ -1,7 +1,7 @@
 //! The samples of a page as a frame: types that frames do not have, packed bits, palettes, separate planes.
 
 use super::directory::{FileDecoder, number, numbers, tiff_error, unsupported};
-use super::stored::{LZMA, PALETTE, ZSTANDARD, restated};
+use super::stored::{LZMA, LZW, PALETTE, ZSTANDARD, restated};
 use crate::error::{Error, Result};
 use crate::io::channels::{ChannelPolicy, Channels};
 use crate::io::exact::{exact_doubles, widened};
@@ -38,7 +38,9 @@ pub(super) fn read<P: ChannelPolicy>(
         None
     };
     let place = Place { path, width: width as usize, height: height as usize };
-    if shift > 0 || palette.is_some() || compression.is_some_and(|code| [LZMA, ZSTANDARD].contains(&code)) {
+    let is_tiled = decoder.get_chunk_type() == ChunkType::Tile;
+    let is_foreign = |code| [LZMA, ZSTANDARD].contains(&code) || (code == LZW && is_tiled);
+    if shift > 0 || palette.is_some() || compression.is_some_and(is_foreign) {
         let mut page = restated(decoder, path, shift, memory)?;
         return place.decoded(&mut page, policy, palette.as_deref());
     }

@@ -1,5 +1,5 @@
 //! Pages stored in ways that the decoder does not know (Zstandard, LZMA, palettes, planes without a directory
-//! of their own), restated as a TIFF file in memory that it knows.
+//! of their own) or misreads (tiles in LZW), restated as a TIFF file in memory that it knows.
 
 use super::directory::{FileDecoder, limits, number, numbers, tiff_error};
 use crate::error::{Error, Result};
@@ -9,6 +9,9 @@ use std::path::Path;
 use tiff::decoder::Decoder;
 use tiff::tags::{ByteOrder, Tag};
 
+/// Tiles in LZW may be full before their end code has been read, which crate `tiff` 0.11 takes for a file
+/// that is cut off (image-rs/image-tiff, 395).
+pub(super) const LZW: u32 = 5;
 /// LZMA2 in xz streams, as libtiff numbers it.
 pub(super) const LZMA: u32 = 34925;
 /// Zstandard, as libtiff numbers it.
@@ -61,7 +64,7 @@ pub(super) fn restated(
         counts.push(chunk.len() as u32);
         file.bytes.extend_from_slice(&chunk);
     }
-    let is_foreign = [LZMA, ZSTANDARD].contains(&compression);
+    let is_foreign = [LZW, LZMA, ZSTANDARD].contains(&compression);
     let photometric = match number(decoder, Tag::PhotometricInterpretation) {
         Some(PALETTE) | None => BLACK_IS_ZERO,
         Some(other) => other,
@@ -82,15 +85,20 @@ pub(super) fn restated(
     Ok(page.with_limits(limits(memory)))
 }
 
-/// The bytes of a strip or tile without Zstandard or LZMA, at most one more than `most`; other compression is
-/// left to the decoder.
-fn expanded(chunk: impl Read, compression: u32, most: u64) -> std::io::Result<Vec<u8>> {
+/// The bytes of a strip or tile without LZW, Zstandard or LZMA, at most one more than `most`; other
+/// compression is left to the decoder.
+fn expanded(mut chunk: impl Read, compression: u32, most: u64) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let most = most.saturating_add(1);
     match compression {
         ZSTANDARD => {
             let stream = ruzstd::decoding::StreamingDecoder::new(chunk).map_err(std::io::Error::other)?;
             stream.take(most).read_to_end(&mut bytes)?;
+        }
+        LZW => {
+            let mut stored = Vec::new();
+            chunk.read_to_end(&mut stored)?;
+            unpack_lzw(&stored, &mut bytes, most)?;
         }
         LZMA => {
             let kilobytes = u32::try_from(most / 1024).unwrap_or(u32::MAX);
@@ -102,6 +110,23 @@ fn expanded(chunk: impl Read, compression: u32, most: u64) -> std::io::Result<Ve
         }
     }
     Ok(bytes)
+}
+
+/// Appends what is `stored` to `bytes` until its end or until they are `most`.
+fn unpack_lzw(mut stored: &[u8], bytes: &mut Vec<u8>, most: u64) -> std::io::Result<()> {
+    let mut decoder = weezl::decode::Decoder::with_tiff_size_switch(weezl::BitOrder::Msb, 8);
+    let mut part = [0; 1 << 13];
+    while (bytes.len() as u64) < most {
+        let step = decoder.decode_bytes(stored, &mut part);
+        stored = &stored[step.consumed_in..];
+        bytes.extend_from_slice(&part[..step.consumed_out]);
+        let status = step.status.map_err(|e| std::io::Error::new(std::io::ErrorKind::InvalidData, e))?;
+        if !matches!(status, weezl::LzwStatus::Ok) {
+            break;
+        }
+    }
+    bytes.truncate(usize::try_from(most).unwrap_or(usize::MAX));
+    Ok(())
 }
 
 /// A file in the making: header, data, then one directory.

@@ -53,7 +53,7 @@ fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     for entry in entries {
         let path = entry.map_err(|e| Error::io(folder, e))?.path();
         let hidden = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
-        if !hidden && has_extension(&path, EXTENSIONS) && path.is_file() {
+        if !hidden && is_image(&path)? {
             paths.push(path);
         }
     }
@@ -62,6 +62,19 @@ fn images_in(folder: &Path) -> Result<Vec<PathBuf>> {
     }
     sort_naturally(&mut paths);
     Ok(paths)
+}
+
+/// Whether this is an image file, by its name. What has such a name and is neither file nor folder, such as a
+/// link to nothing, is an error: left out, it would be a frame lost without a word.
+pub(super) fn is_image(path: &Path) -> Result<bool> {
+    if !has_extension(path, EXTENSIONS) {
+        return Ok(false);
+    }
+    let kind = std::fs::metadata(path).map_err(|e| Error::io(path, e))?.file_type();
+    if kind.is_file() || kind.is_dir() {
+        return Ok(kind.is_file());
+    }
+    Err(Error::format(path, "is no file, expected an image, as its name says"))
 }
 
 /// Natural order: runs of digits by their value, all other text by its bytes; names that differ only in the

@@ -1,6 +1,6 @@
 //! Image files that match a pattern.
 
-use super::{FilesSource, Kind, files::is_pattern, files::sort_naturally, has_extension};
+use super::{FilesSource, Kind, files::is_image, files::is_pattern, files::sort_naturally};
 use crate::error::{Error, Result};
 use crate::io::decode::EXTENSIONS;
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ fn matches(pattern: &str) -> Result<Vec<PathBuf>> {
     let mut found = Vec::new();
     for path in paths {
         let path = path.map_err(|e| Error::io(e.path(), std::io::Error::from(e.error().kind())))?;
-        if has_extension(&path, EXTENSIONS) && path.is_file() {
+        if is_image(&path)? {
             found.push(path);
         }
     }
