@@ -20,6 +20,7 @@ frames, `StereoTracker` everything that moves before two cameras. Grey frames ar
 from __future__ import annotations
 
 import operator
+import os
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, fields
 from typing import Any
@@ -263,6 +264,8 @@ def track(frames: Iterable[ArrayLike], bbox: ArrayLike | None = None, **options:
 def _follow(kind: type[GradientTracker], frames: Iterable[ArrayLike], bbox: ArrayLike | None, options: dict[str, Any]) -> Track:
     """A tracker of a kind through frames."""
     known_options("track", kind, options)
+    if isinstance(frames, (str, os.PathLike)):
+        raise TypeError(f"frames: expected frames, got the name of a file ({frames}); open it with jacoflow.io.frames(path)")
     try:
         rest = iter(frames)
     except TypeError:

@@ -120,7 +120,8 @@ pub fn save_field(py: Python<'_>, field: &FlowField, path: &Path, options: &str)
         (Some(format), false) => write_one(py, field, 0, format, path, options),
         (None, true) => {
             let names = NumberedFiles::create(path, "flow", FieldFormat::Npz.extension())?;
-            names.clear()?;
+            // A run is saved in parts, first to last: what an earlier run left behind this part is not of it.
+            names.clear_except(|frame| frame < field.first_frame())?;
             for index in 0..count {
                 py.check_signals()?;
                 let name = names.path(field.first_frame() + index);

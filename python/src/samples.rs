@@ -67,7 +67,7 @@ fn expect_exact(argument: &str, array: &Bound<'_, PyUntypedArray>, masked: bool)
     Ok(())
 }
 
-/// Refuses what is no array: the name of a file, None, a dictionary.
+/// Refuses what is no array: the name of a file, None, a dictionary, an object without values.
 pub fn refuse_non_array(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<()> {
     if object.is_instance_of::<PyString>() || object.hasattr("__fspath__")? {
         return Err(PyTypeError::new_err(format!(
@@ -76,7 +76,9 @@ pub fn refuse_non_array(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<()
         ))
         .into());
     }
-    if object.is_none() || object.is_instance_of::<PyDict>() {
+    let has_values = ["__array__", "__array_interface__", "__len__", "__iter__", "__float__"];
+    let holds_none = || has_values.iter().all(|name| !object.hasattr(*name).unwrap_or(true));
+    if object.is_none() || object.is_instance_of::<PyDict>() || holds_none() {
         let got = if object.is_none() { "None".into() } else { object.get_type().name()?.to_string() };
         return Err(PyTypeError::new_err(format!("{argument}: expected an array, got {got}")).into());
     }

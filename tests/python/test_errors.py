@@ -37,6 +37,7 @@ GOOD = np.zeros((3, 8, 10), np.uint8)
         ("clip.mp4", TypeError, r"frames: expected an array, got the name of a file \(clip.mp4\); open it with jacoflow.io.frames\(path\)"),
         (Path("clip.mp4"), TypeError, r"frames: expected an array, got the name of a file \(clip.mp4\)"),
         (None, TypeError, "frames: expected an array, got None"),
+        (object(), TypeError, "frames: expected an array, got object"),
         ([None, None, None], TypeError, "frames: expected an array, got None"),
         ({"frames": GOOD}, TypeError, "frames: expected an array, got dict"),
     ],
@@ -45,6 +46,13 @@ GOOD = np.zeros((3, 8, 10), np.uint8)
 def test_frames_that_cannot_be_used(frames, error, message, method):
     with pytest.raises(error, match=message):
         jacoflow.estimate(frames, method=method)
+
+
+def test_names_of_files_are_no_frames():
+    with pytest.raises(TypeError, match=r"got the name of a file \(a.png\); open it with jacoflow.io.frames"):
+        jacoflow.flow("a.png", "b.png")
+    with pytest.raises(TypeError, match=r"got the name of a file \(a.avi\); open it with jacoflow.io.frames"):
+        jacoflow.track.track("a.avi", bbox=(1, 2, 9, 9))
 
 
 @pytest.mark.parametrize(

@@ -259,6 +259,15 @@ def test_points_and_stacks_go_to_npz(tmp_path):
         stack.save(tmp_path / "stack.npz")
 
 
+def test_a_stack_is_saved_in_parts_and_over_a_longer_run(tmp_path):
+    stack = jacoflow.estimate(scenes.Scene("affine", width=32, height=32).frames(6))
+    for first in (0, 2, 4):
+        stack[first : first + 2].save(tmp_path / "run")
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == [f"flow_{k:06}.npz" for k in range(6)]
+    stack[:2].save(tmp_path / "run")
+    assert sorted(path.name for path in (tmp_path / "run").iterdir()) == ["flow_000000.npz", "flow_000001.npz"]
+
+
 def test_indexing_a_stack():
     stack = jacoflow.estimate(scenes.Scene("affine", width=32, height=32).frames(5), ends="drop")
     assert len(stack) == 3 and stack.flow.shape == (3, 32, 32, 2)

@@ -285,10 +285,12 @@ macro_rules! define_estimate {
 }
 estimator_options!(define_estimate []);
 
-/// Refuses a method among the frames, by the keyword that it needs.
+/// Refuses a method among the frames, by the keyword that it needs; names of files are left to the frames.
 fn refuse_positional_method<'py>(arguments: impl Iterator<Item = Bound<'py, PyAny>>) -> Outcome<()> {
     for argument in arguments {
-        if let Ok(word) = argument.extract::<String>() {
+        if let Ok(word) = argument.extract::<String>()
+            && !word.contains(['.', '/'])
+        {
             let got = format!("method: expected as a keyword, method={word:?}, got {word:?} among the frames");
             return Err(PyTypeError::new_err(got).into());
         }

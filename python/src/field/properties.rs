@@ -123,8 +123,10 @@ impl FlowField {
     /// Writes the field; the extension of `path` chooses the format: .npz (everything, in its units), .flo,
     /// .png (KITTI) or .pfm (flow in px/frame only).
     ///
-    /// A stack goes to a folder (`path` without extension) as flow_000001.npz, ... by frame index. `options`
-    /// is free text kept in .npz. OSError when the file cannot be written, ValueError for another extension.
+    /// A stack goes to a folder (`path` without extension) as flow_000001.npz, ... by frame index; files of
+    /// these names after its first frame that it does not replace are removed, as they are of a longer run.
+    /// `options` is free text kept in .npz. OSError when the file cannot be written, ValueError for another
+    /// extension.
     #[pyo3(signature = (path, *, options=""))]
     fn save(
         &self,
