@@ -11,7 +11,6 @@ use super::paths::{CommandPaths, is_same_file};
 use super::report::{Report, print_message};
 use super::run::{ReportContext, input_details, report, run_pipeline};
 use crate::error::{Error, Result};
-use crate::image::Preprocess;
 use crate::io::{Element, npz::NpzReader};
 use crate::pipeline::{FilterStage, OutputPlan, Pipeline, check_target, is_folder};
 use crate::simd::SimdReal;
@@ -56,24 +55,25 @@ pub struct FilterCommand {
 impl FilterCommand {
     /// Runs the command.
     pub fn execute(&self, watch: &Watch) -> Result<Report> {
-        if let (Some(_), Some(name)) = (&self.resume, self.filter.given()) {
+        let steps = [("quantise", self.input.quantise), ("smooth", self.input.smooth), ("fps", self.input.fps)];
+        let step = steps.into_iter().find(|(_, given)| given.is_some()).map(|(name, _)| name);
+        if let (Some(_), Some(name)) = (&self.resume, self.filter.given().or(step)) {
             return Err(Error::argument(name, "no such option with --resume, whose state has its own", "one"));
         }
         let _new_folders = self.paths()?.check(self.output.force)?;
         let mut opened = open_input(&self.input)?;
         let options = self.options(&mut opened)?;
-        let steps = preprocess(&self.input, options.mask.as_ref())?;
         if let Some(path) = self.save_state.as_ref().filter(|path| !self.is_in_new_folder(path)) {
             check_target(path, self.output.force || self.is_resumed(path))
                 .map_err(|error| error.about("save_state"))?;
         }
         if let Some(path) = &self.resume {
-            return self.resume(path, opened, &options, steps, watch);
+            return self.resume(path, opened, &options, watch);
         }
         if options.is_double(self.compute.precision, opened.first.dtype) {
-            self.run(opened, FilterStage::<f64>::new(options, steps), watch)
+            self.run(opened, FilterStage::<f64>::new(options), watch)
         } else {
-            self.run(opened, FilterStage::<f32>::new(options, steps), watch)
+            self.run(opened, FilterStage::<f32>::new(options), watch)
         }
     }
 
@@ -98,24 +98,17 @@ impl FilterCommand {
     }
 
     /// Goes on with a saved filter, in the precision that it was saved in.
-    fn resume(
-        &self,
-        path: &Path,
-        opened: Opened,
-        options: &FlowFilterOptions,
-        steps: Preprocess,
-        watch: &Watch,
-    ) -> Result<Report> {
+    fn resume(&self, path: &Path, opened: Opened, options: &FlowFilterOptions, watch: &Watch) -> Result<Report> {
         if self.compute.precision != Precision::Auto {
             return Err(Error::argument("precision", "auto with --resume, whose state has its own", "another"));
         }
         let (threads, simd) = (options.threads, options.simd);
         if SavedFilter::is_double(&mut NpzReader::open(path)?)? {
             let filter = FlowFilter::<f64>::load(path)?.with_computation(threads, simd);
-            self.run(opened, FilterStage::resume(filter, steps), watch)
+            self.run(opened, FilterStage::resume(filter), watch)
         } else {
             let filter = FlowFilter::<f32>::load(path)?.with_computation(threads, simd);
-            self.run(opened, FilterStage::resume(filter, steps), watch)
+            self.run(opened, FilterStage::resume(filter), watch)
         }
     }
 
@@ -129,6 +122,7 @@ impl FilterCommand {
         options.sites = self.grid.sampling_grid()?;
         options.sites.shape(opened.first.size)?;
         options.mask = read_mask(self.grid.mask.as_deref(), opened.first.size)?;
+        options.preprocess = preprocess(&self.input, options.mask.as_ref())?;
         (options.threads, options.simd) = compute(&self.compute)?;
         Ok(options)
     }

@@ -2,6 +2,7 @@
 
 /// How an image continues beyond its edge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Border {
     /// Mirrored about the last pixel's side: `d c b a | a b c d | d c b a` (scipy's `reflect`).
     #[default]

@@ -6,12 +6,14 @@ use crate::types::{Frame, Mask};
 
 /// What is done to each frame first: quantise, then smooth (WO2010/098160, figure 1).
 #[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Preprocess {
     /// Rounding down to grey levels, as a camera does.
     pub quantise: Option<Quantiser>,
     /// Gaussian smoothing.
     pub smooth: Option<GaussianSmoother>,
-    /// Pixels that may be used: smoothing takes the others for missing.
+    /// Pixels that may be used: smoothing takes the others for missing. Not saved.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub mask: Option<Mask>,
 }
 

@@ -17,6 +17,7 @@ const MAX_FRACTIONAL: f64 = (1u64 << 52) as f64;
 /// Step 1, the default, turns a computed brightness into the integer that a camera would report, as in
 /// embodiment 2 of WO2010/098160. NaN and infinities stay as they are.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Quantiser {
     /// Distance between neighbouring levels, grey levels; default 1.
     pub step: f64,

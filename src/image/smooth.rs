@@ -17,6 +17,7 @@ const MAX_RADIUS: f64 = 16_384.0;
 /// neighbourhood, so a NaN damages only the pixels whose kernel reaches it. Results are bit-identical for any
 /// number of threads.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GaussianSmoother {
     /// Standard deviation of the Gaussian, px; 0 changes nothing.
     pub sigma: f64,

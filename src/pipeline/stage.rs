@@ -1,7 +1,6 @@
 //! The step in the middle: from frames to flow fields.
 
 use crate::error::{Error, Result};
-use crate::image::Preprocess;
 use crate::io::Element;
 use crate::simd::SimdReal;
 use crate::temporal::{FlowFilter, FlowFilterOptions, FlowStream};
@@ -50,21 +49,20 @@ impl<T: SimdReal> Stage<T> for FlowStream<T> {
 ///
 /// The filter is created with the first frame, whose size it needs, unless a saved one is resumed.
 pub struct FilterStage<T> {
-    preprocess: Preprocess,
     options: FlowFilterOptions,
     filter: Option<FlowFilter<T>>,
     pushed: usize,
 }
 
 impl<T: SimdReal> FilterStage<T> {
-    /// A filter that starts with the first frame; `preprocess` is applied to each frame.
-    pub fn new(options: FlowFilterOptions, preprocess: Preprocess) -> Self {
-        Self { preprocess, options, filter: None, pushed: 0 }
+    /// A filter that starts with the first frame.
+    pub fn new(options: FlowFilterOptions) -> Self {
+        Self { options, filter: None, pushed: 0 }
     }
 
     /// A filter that goes on from its saved state.
-    pub fn resume(filter: FlowFilter<T>, preprocess: Preprocess) -> Self {
-        Self { preprocess, options: filter.options().clone(), filter: Some(filter), pushed: 0 }
+    pub fn resume(filter: FlowFilter<T>) -> Self {
+        Self { options: filter.options().clone(), filter: Some(filter), pushed: 0 }
     }
 
     /// The filter's options.
@@ -84,7 +82,7 @@ impl<T: SimdReal + Element> Stage<T> for FilterStage<T> {
             Some(filter) => filter,
             empty => empty.insert(FlowFilter::new(frame.size(), self.options.clone())?),
         };
-        let frame = self.options.threads.install(|| self.preprocess.apply(frame.to_real()));
+        let frame = filter.prepare(frame.to_real());
         let mut field = filter.push(&frame)?;
         // A resumed filter counts the frames of its whole life; the run counts its own.
         field.layout.frame_index = self.pushed;

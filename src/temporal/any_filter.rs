@@ -3,7 +3,6 @@
 use super::smoother::{bytes, smooth};
 use super::{FlowFilter, FlowFilterOptions, SavedFilter};
 use crate::error::{Error, Result, check_memory};
-use crate::image::Preprocess;
 use crate::io::Element;
 use crate::io::npz::NpzReader;
 use crate::simd::SimdReal;
@@ -20,7 +19,6 @@ pub struct AnyFlowFilter {
     options: FlowFilterOptions,
     /// Whether `options.full_scale` holds for frames of every sample type.
     full_scale_given: bool,
-    preprocess: Preprocess,
     precision: Precision,
     /// Sample type of the first frame; unknown after a state has been loaded from a file.
     dtype: Option<&'static str>,
@@ -50,15 +48,10 @@ macro_rules! each {
 impl AnyFlowFilter {
     /// A filter that starts with the first frame. Without `full_scale` that of the options holds for floating
     /// point frames, and integer frames have the largest value of their type.
-    pub fn new(
-        options: FlowFilterOptions,
-        full_scale: Option<f64>,
-        preprocess: Preprocess,
-        precision: Precision,
-    ) -> Self {
+    pub fn new(options: FlowFilterOptions, full_scale: Option<f64>, precision: Precision) -> Self {
         let full_scale_given = full_scale.is_some();
         let options = FlowFilterOptions { full_scale: full_scale.unwrap_or(options.full_scale), ..options };
-        Self { options, full_scale_given, preprocess, precision, dtype: None, filter: Filter::Empty }
+        Self { options, full_scale_given, precision, dtype: None, filter: Filter::Empty }
     }
 
     /// The field after the next frame. `dtype` is the type that the samples were given in, which is not that
@@ -90,8 +83,8 @@ impl AnyFlowFilter {
         }
         match &mut self.filter {
             Filter::Empty => Err(Error::Numerical("the filter has not started".into())),
-            Filter::Single(filter) => advance(filter, &self.preprocess, frame).map(AnyField::Single),
-            Filter::Double(filter) => advance(filter, &self.preprocess, frame).map(AnyField::Double),
+            Filter::Single(filter) => advance(filter, frame).map(AnyField::Single),
+            Filter::Double(filter) => advance(filter, frame).map(AnyField::Double),
         }
     }
 
@@ -116,8 +109,7 @@ impl AnyFlowFilter {
     fn smoothed<T: SimdReal>(&self, options: FlowFilterOptions, frames: &[AnyFrame]) -> Result<Vec<FlowField<T>>> {
         let filter = FlowFilter::<T>::new(frames[0].size(), options)?;
         check_memory("frames", bytes(&filter, frames.len()))?;
-        let prepare = |frame: &AnyFrame| self.preprocess.apply(frame.to_real());
-        let prepared: Vec<_> = filter.options().threads.install(|| frames.iter().map(prepare).collect());
+        let prepared: Vec<_> = frames.iter().map(|frame| filter.prepare(frame.to_real())).collect();
         smooth(&filter, &prepared)
     }
 
@@ -227,11 +219,6 @@ impl AnyFlowFilter {
     }
 }
 
-fn advance<T: SimdReal + Element>(
-    filter: &mut FlowFilter<T>,
-    preprocess: &Preprocess,
-    frame: &AnyFrame,
-) -> Result<FlowField<T>> {
-    let prepared = filter.options().threads.install(|| preprocess.apply(frame.to_real()));
-    filter.push(&prepared)
+fn advance<T: SimdReal + Element>(filter: &mut FlowFilter<T>, frame: &AnyFrame) -> Result<FlowField<T>> {
+    filter.push(&filter.prepare(frame.to_real()))
 }

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::filter::SigmaPoints;
+use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::jet::Neighbourhood;
 use crate::parallel::Threads;
 use crate::simd::Level;
@@ -101,6 +102,8 @@ pub struct FlowFilterOptions {
     pub sigma_points: SigmaPoints,
     /// The sample value that stands for 255 grey levels: 65535 for `u16`, 1 for floats in [0, 1].
     pub full_scale: f64,
+    /// What is done to each frame first, by [`FlowFilter::prepare`](super::FlowFilter::prepare).
+    pub preprocess: Preprocess,
     /// Where the filters are; every pixel by default.
     pub sites: SamplingGrid,
     /// Which pixels may be used; `None`: all.
@@ -155,6 +158,7 @@ impl FlowFilterOptions {
             initial_covariance: [1.0; 12],
             sigma_points: SigmaPoints::default(),
             full_scale: 255.0,
+            preprocess: Preprocess::default(),
             sites: SamplingGrid::default(),
             mask: None,
             covariance: false,
@@ -206,6 +210,12 @@ impl FlowFilterOptions {
         all("initial_mean", &self.initial_mean, "twelve finite numbers", &|_| true)?;
         all("initial_covariance", &self.initial_covariance, "twelve finite variances, each > 0", &|v| v > 0.0)?;
         all("full_scale", &[self.full_scale], "a finite number > 0", &|v| v > 0.0)?;
+        if let Some(quantiser) = &self.preprocess.quantise {
+            Quantiser::new(quantiser.step)?;
+        }
+        if let Some(smoother) = &self.preprocess.smooth {
+            GaussianSmoother::with(smoother.sigma, smoother.truncate, smoother.border)?;
+        }
         self.units.check()?;
         self.sigma_points.check(12)?;
         self.threads.check()?;

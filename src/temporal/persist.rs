@@ -18,7 +18,7 @@ use std::io::{Cursor, Read, Seek, Write};
 use std::path::Path;
 
 /// Rises when the meaning of a file changes.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 const FORMAT: &str = "jacoflow flow filter";
 
 #[derive(Serialize, Deserialize)]
@@ -109,6 +109,7 @@ impl<T: SimdReal + Element> FlowFilter<T> {
                 return Err(wrong(format!("expected a mask of shape {expected}, got {got}")));
             }
             options.mask = Some(Frame::new(width, height, array.values.iter().map(|&used| used != 0).collect())?);
+            options.preprocess.mask.clone_from(&options.mask);
         }
         let mean = reader.array::<T>("mean")?;
         let root = reader.array::<T>("root")?;

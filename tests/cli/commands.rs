@@ -224,7 +224,7 @@ fn fields_of_a_known_rate_and_pitch_are_in_those_units() {
 fn the_filter_follows_the_ramp_and_goes_on_from_its_state() {
     let place = Place::new();
     place.good("synth ramp -o ramp.npy --frames 60 --size 24x20 --origin 48,70 --rounding floor");
-    let filter = "filter ramp.npy --profile measured --form fast --neighbourhood 9x9";
+    let filter = "filter ramp.npy --profile measured --form fast --neighbourhood 9x9 --quantise=2 --smooth 1";
     place.good(&format!("{filter} -o whole --stop 60"));
     place.good(&format!("{filter} -o first --stop 25 --save-state state.npz"));
     place.good("filter ramp.npy -o second --start 25 --resume state.npz");

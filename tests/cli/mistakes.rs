@@ -103,6 +103,22 @@ fn broken_and_missing_files_are_named() {
 }
 
 #[test]
+fn a_resumed_filter_has_its_options() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 4 --size 40x32");
+    for (option, name) in [
+        ("--smooth 3", "smooth"),
+        ("--quantise", "quantise"),
+        ("--fps 50", "fps"),
+        ("--profile patent", "profile"),
+        ("--measurement-noise 2", "measurement_noise"),
+    ] {
+        let expected = format!("error: {name}: expected no such option with --resume");
+        fails(&place, &format!("filter s.npy {option} --resume state.npz -o out"), 2, &[&expected]);
+    }
+}
+
+#[test]
 fn a_mask_of_another_size_and_frames_of_another_size_are_refused() {
     let place = Place::new();
     place.good("synth affine -o a --frames 3 --size 40x32");

@@ -134,6 +134,8 @@ def test_a_saved_filter_is_taken_up_only_where_it_fits(frames, tmp_path):
     one.save(tmp_path / "state.npz")
     with pytest.raises(ValueError, match="same options"):
         FlowFilter(profile=jacoflow.FilterProfile(R=0.5)).load(tmp_path / "state.npz")
+    with pytest.raises(ValueError, match="same options"):
+        FlowFilter(preprocess=jacoflow.Preprocess(smooth=3.0)).load(tmp_path / "state.npz")
     other = FlowFilter()
     other.load(tmp_path / "state.npz")
     with pytest.raises(ValueError, match="full scale"):

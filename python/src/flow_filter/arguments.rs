@@ -73,6 +73,7 @@ impl Arguments {
                 group.get("kappa")?.unwrap_or(points.kappa),
             )?,
             full_scale: group.get("full_scale")?.unwrap_or(base.full_scale),
+            preprocess: base.preprocess,
             sites: options::grid(py, &self.grid)?,
             mask: self.mask.as_ref().map(|mask| arrays::mask(mask.bind(py))).transpose()?,
             covariance: self.covariance,

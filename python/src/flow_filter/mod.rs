@@ -170,12 +170,12 @@ impl FlowFilter {
 impl FlowFilter {
     fn from_arguments(py: Python<'_>, arguments: Arguments) -> Outcome<Self> {
         let arguments = arguments.keep(py)?;
-        let options = arguments.options(py)?;
+        let mut options = arguments.options(py)?;
         let full_scale = arguments.profile(py)?.1.get("full_scale")?;
         let preprocess = PreprocessOptions::new(py, &arguments.preprocess)?;
-        let steps = preprocess.steps(options.mask.as_ref())?;
+        options.preprocess = preprocess.steps(options.mask.as_ref())?;
         let precision = options::precision(arguments.precision.as_deref())?;
-        let filter = AnyFlowFilter::new(options, full_scale, steps, precision);
+        let filter = AnyFlowFilter::new(options, full_scale, precision);
         Ok(Self { colour: preprocess.colour, filter, arguments })
     }
 

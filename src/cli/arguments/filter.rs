@@ -11,9 +11,9 @@ use serde_json::{Value, json};
 #[command(next_help_heading = "Filter")]
 pub struct FilterArguments {
     /// Set of constants: patent (embodiment 2 of WO2010/098160: quantised frames, smoothed by 3 px) or
-    /// measured (9x9 pixels, raw 8-bit frames, unbiased divergence)
-    #[arg(long, value_name = "NAME", default_value = "patent")]
-    pub profile: String,
+    /// measured (9x9 pixels, raw 8-bit frames, unbiased divergence) [default: patent]
+    #[arg(long, value_name = "NAME")]
+    pub profile: Option<String>,
     /// Prediction: augmented (49 sigma points), non-augmented (25), fast (13: the numbers of the 25 with the
     /// motion first, for the profile measured) or extended
     #[arg(long, value_name = "NAME")]
@@ -76,7 +76,7 @@ fn parse_twelve(text: &str) -> std::result::Result<Twelve, String> {
 impl FilterArguments {
     /// The constants for frames of samples of `dtype`.
     pub fn options(&self, dtype: &str) -> Result<FlowFilterOptions> {
-        let mut options = FlowFilterOptions::profile(&self.profile)?;
+        let mut options = FlowFilterOptions::profile(self.profile.as_deref().unwrap_or("patent"))?;
         if let Some(form) = &self.form {
             options.form = FilterForm::parse(&word(form))?;
         }
@@ -101,6 +101,7 @@ impl FilterArguments {
     /// The names of options that a resumed filter already has and that cannot be given again.
     pub fn given(&self) -> Option<&'static str> {
         let given = [
+            ("profile", self.profile.is_some()),
             ("form", self.form.is_some()),
             ("transition", self.transition.is_some()),
             ("square_root", self.square_root.is_some()),

@@ -112,6 +112,11 @@ impl<T: SimdReal> FlowFilter<T> {
         Some(self.store.state(index))
     }
 
+    /// A frame after the steps of the options: what [`push`](Self::push) expects.
+    pub fn prepare(&self, frame: Frame<T>) -> Frame<T> {
+        self.options.threads.install(|| self.options.preprocess.apply(frame))
+    }
+
     /// Takes in the next frame; returns flow and Jacobian with the `Status` of each site.
     ///
     /// Where a neighbourhood holds a NaN the filter only predicts; the result is NaN, `NonFinite`. Where the
