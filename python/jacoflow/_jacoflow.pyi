@@ -387,7 +387,8 @@ class FlowField:
 
         A stack goes to a folder (`path` without extension) as flow_000001.npz, ... by frame index; files of
         these names after its first frame that it does not replace are removed, as they are of a longer run.
-        `options` is free text kept in .npz. OSError when the file cannot be written, ValueError for another extension.
+        `options` is free text kept in .npz. OSError when the file cannot be written, ValueError for another
+        extension.
         """
     @staticmethod
     def from_arrays(

@@ -102,7 +102,7 @@ pub struct FlowFilterOptions {
     pub sigma_points: SigmaPoints,
     /// The sample value that stands for 255 grey levels: 65535 for `u16`, 1 for floats in [0, 1].
     pub full_scale: f64,
-    /// What is done to each frame first, by [`FlowFilter::prepare`](super::FlowFilter::prepare).
+    /// What [`FlowFilter::prepare`](super::FlowFilter::prepare) does to each frame first, with the `mask`.
     pub preprocess: Preprocess,
     /// Where the filters are; every pixel by default.
     pub sites: SamplingGrid,

@@ -109,7 +109,6 @@ impl<T: SimdReal + Element> FlowFilter<T> {
                 return Err(wrong(format!("expected a mask of shape {expected}, got {got}")));
             }
             options.mask = Some(Frame::new(width, height, array.values.iter().map(|&used| used != 0).collect())?);
-            options.preprocess.mask.clone_from(&options.mask);
         }
         let mean = reader.array::<T>("mean")?;
         let root = reader.array::<T>("root")?;

@@ -224,7 +224,7 @@ fn fields_of_a_known_rate_and_pitch_are_in_those_units() {
 fn the_filter_follows_the_ramp_and_goes_on_from_its_state() {
     let place = Place::new();
     place.good("synth ramp -o ramp.npy --frames 60 --size 24x20 --origin 48,70 --rounding floor");
-    let filter = "filter ramp.npy --profile measured --form fast --neighbourhood 9x9 --quantise=2 --smooth 1";
+    let filter = "filter ramp.npy --profile measured --form fast --neighbourhood 9x9";
     place.good(&format!("{filter} -o whole --stop 60"));
     place.good(&format!("{filter} -o first --stop 25 --save-state state.npz"));
     place.good("filter ramp.npy -o second --start 25 --resume state.npz");
@@ -238,6 +238,16 @@ fn the_filter_follows_the_ramp_and_goes_on_from_its_state() {
     let last = read_npz::<f64>(place.path("whole/000059.npz")).unwrap().field;
     let got = last.affine(10 * 24 + 12);
     assert!(got.u.is_finite() && (got.v_x - 0.0314).abs() < 0.02, "{got:?}");
+    // What is done to the frames first goes with the state.
+    let smoothed = "filter ramp.npy --smooth 1 --quantise=2";
+    place.good(&format!("{smoothed} -o smooth --stop 6"));
+    place.good(&format!("{smoothed} -o start --stop 3 --save-state smooth.npz"));
+    place.good("filter ramp.npy -o rest --start 3 --stop 6 --resume smooth.npz");
+    for index in 3..6 {
+        let [a, b] = ["smooth", "rest"]
+            .map(|folder| read_npz::<f64>(place.path(&format!("{folder}/{index:06}.npz"))).unwrap().field);
+        assert_eq!(bits(&a.motion), bits(&b.motion), "{index}");
+    }
 }
 
 fn bits(values: &[f64]) -> Vec<u64> {

@@ -56,8 +56,9 @@ impl<T: SimdReal> FlowFilter<T> {
     /// # Errors
     /// [`Error::Argument`] naming the option that no filter can run with, or `frame_size` when the sites and
     /// their neighbourhoods have no room at all (frames under 3x3).
-    pub fn new(frame_size: (usize, usize), options: FlowFilterOptions) -> Result<Self> {
+    pub fn new(frame_size: (usize, usize), mut options: FlowFilterOptions) -> Result<Self> {
         options.check(frame_size)?;
+        options.preprocess.mask.clone_from(&options.mask);
         if frame_size.0 < 3 || frame_size.1 < 3 {
             return Err(Error::argument(
                 "frame_size",
