@@ -100,17 +100,10 @@ impl AnyFlowFilter {
         }
         let options = FlowFilterOptions { full_scale: self.full_scale(dtype), ..self.options.clone() };
         Ok(if self.options.is_double(self.precision, dtype) {
-            self.smoothed::<f64>(options, frames)?.into_iter().map(AnyField::Double).collect()
+            smoothed::<f64>(options, frames)?.into_iter().map(AnyField::Double).collect()
         } else {
-            self.smoothed::<f32>(options, frames)?.into_iter().map(AnyField::Single).collect()
+            smoothed::<f32>(options, frames)?.into_iter().map(AnyField::Single).collect()
         })
-    }
-
-    fn smoothed<T: SimdReal>(&self, options: FlowFilterOptions, frames: &[AnyFrame]) -> Result<Vec<FlowField<T>>> {
-        let filter = FlowFilter::<T>::new(frames[0].size(), options)?;
-        check_memory("frames", bytes(&filter, frames.len()))?;
-        let prepared: Vec<_> = frames.iter().map(|frame| filter.prepare(frame.to_real())).collect();
-        smooth(&filter, &prepared)
     }
 
     /// Forgets every frame.
@@ -217,6 +210,13 @@ impl AnyFlowFilter {
         self.dtype = dtype;
         Ok(())
     }
+}
+
+fn smoothed<T: SimdReal>(options: FlowFilterOptions, frames: &[AnyFrame]) -> Result<Vec<FlowField<T>>> {
+    let filter = FlowFilter::<T>::new(frames[0].size(), options)?;
+    check_memory("frames", bytes(&filter, frames.len()))?;
+    let prepared: Vec<_> = frames.iter().map(|frame| filter.prepare(frame.to_real())).collect();
+    smooth(&filter, &prepared)
 }
 
 fn advance<T: SimdReal + Element>(filter: &mut FlowFilter<T>, frame: &AnyFrame) -> Result<FlowField<T>> {
