@@ -5,8 +5,8 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 BIN := $(VENV)/bin
 WHEELS := target/wheels
 # One profile and one set of features for all that the check runs: the library and the crates that it depends on
-# are built once, for the wheel and for Rust's tests. Kernels for AVX-512 take a sixth of that time: where the
-# processor cannot run them, they are left out (clippy reads them).
+# are built once, for the wheel and for Rust's tests. Kernels for AVX-512 are left out where
+# the processor cannot run them (clippy reads them).
 AVX512 := $(if $(shell grep -m1 -wo avx512vl /proc/cpuinfo 2>/dev/null),avx512)
 CHECKED := --profile ci --no-default-features --features "cli reference $(AVX512)"
 # Unit tests also look for overflow and failed assertions.
