@@ -67,13 +67,13 @@ guide:
 
 $(BIN)/maturin:
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -q "maturin>=1.9.4,<2"
+	$(BIN)/python -m pip install -q "maturin>=1.16,<2"
 
 # As the check tests it (the binding asks for `cli` itself); `compare` builds what users get.
 BUILT = $(subst cli ,,$(CHECKED))
 wheel: $(BIN)/maturin
 	rm -rf $(WHEELS)
-	$(BIN)/maturin build -q $(BUILT) --out $(WHEELS) -i $(BIN)/python
+	$(BIN)/maturin build -q $(BUILT) --compression-level 9 --out $(WHEELS) -i $(BIN)/python
 
 # What the package and its tests need beside the wheel.
 packages: $(BIN)/maturin
