@@ -37,8 +37,6 @@ const HALF_WEIGHT_RESIDUAL: f64 = 2.0;
 const GAIN_BOUNDS: [f64; 2] = [0.1, 10.0];
 /// Minimum number of pixels, of a frame or of a measurement.
 const MIN_PIXELS: usize = 128;
-/// Sites of one task.
-const SITES_PER_TASK: usize = 1024;
 
 /// Index of the frame that the others are brought to: the one the field belongs to.
 fn reference(frames: usize) -> usize {
@@ -99,31 +97,33 @@ struct LightMap {
     nodes: Vec<[f64; 2]>,
 }
 
+fn blend(first: &[f64; 2], second: &[f64; 2], share: f64) -> [f64; 2] {
+    [0, 1].map(|k| first[k] + share * (second[k] - first[k]))
+}
+
 impl LightMap {
     fn constant(node: [f64; 2]) -> Self {
         Self { columns: 1, rows: 1, pitch: f64::INFINITY, nodes: vec![node] }
     }
 
-    /// The nodes around a position, and the share of each.
-    fn around(&self, x: f64, y: f64) -> [(usize, f64); 4] {
-        let split = |at: f64, count: usize| {
-            let at = at / self.pitch;
-            let first = (at as usize).min(count.saturating_sub(2));
-            (first, (first + 1).min(count - 1), (at - first as f64).clamp(0.0, 1.0))
-        };
-        let ((left, right, along), (above, below, across)) = (split(x, self.columns), split(y, self.rows));
-        let node = |x: usize, y: usize| y * self.columns + x;
-        [
-            (node(left, above), (1.0 - along) * (1.0 - across)),
-            (node(right, above), along * (1.0 - across)),
-            (node(left, below), (1.0 - along) * across),
-            (node(right, below), along * across),
-        ]
+    /// Along an axis with `count` nodes: the first of two around a position, the second, and its share.
+    fn around(&self, at: f64, count: usize) -> (usize, usize, f64) {
+        let at = at / self.pitch;
+        let first = (at as usize).min(count.saturating_sub(2));
+        (first, (first + 1).min(count - 1), (at - first as f64).clamp(0.0, 1.0))
+    }
+
+    /// Gain and offset at the columns of nodes on row `y`.
+    fn line(&self, y: f64) -> Vec<[f64; 2]> {
+        let (above, below, share) = self.around(y, self.rows);
+        let row = |y: usize| &self.nodes[y * self.columns..][..self.columns];
+        row(above).iter().zip(row(below)).map(|(a, b)| blend(a, b, share)).collect()
     }
 
     fn at(&self, x: f64, y: f64) -> [f64; 2] {
-        let around = self.around(x, y);
-        [0, 1].map(|k| around.iter().map(|&(node, share)| share * self.nodes[node][k]).sum())
+        let (left, right, share) = self.around(x, self.columns);
+        let line = self.line(y);
+        blend(&line[left], &line[right], share)
     }
 
     fn remove_from<T: SimdReal>(&self, frame: &Frame<T>) -> Frame<T> {
@@ -160,10 +160,11 @@ pub(super) fn equalize_along<T: SimdReal>(
     (scale, are_equalized): (f64, bool),
 ) -> Option<Equalized<T>> {
     let samples: Vec<Vec<f64>> = views.iter().map(|view| sample(simd, view, motion)).collect();
-    let known = &samples[reference(frames.len())];
+    let reference = reference(frames.len());
     let size = (motion.width, motion.height);
     let most = MAX_REMAINING[usize::from(are_equalized)];
-    let found: Vec<Option<LightMap>> = samples.iter().map(|other| fit(size, known, other, most)).collect();
+    let of = |n: usize| (n != reference).then(|| fit(size, &samples[reference], &samples[n], most)).flatten();
+    let found: Vec<Option<LightMap>> = (0..samples.len()).map(of).collect();
     if found.iter().all(Option::is_none) || !keeps("flow.brightness_change") {
         return None;
     }
@@ -202,49 +203,91 @@ fn fit((width, height): (usize, usize), known: &[f64], other: &[f64], most: f64)
     let pitch = (width.max(height) as f64 / WINDOWS).max(MIN_PITCH);
     let [columns, rows] = [width, height].map(|len| ((len as f64 - 1.0) / pitch).ceil() as usize + 1);
     let mut map = LightMap { columns, rows, pitch, nodes: vec![[1.0, 0.0]; columns * rows] };
-    let before = residual_std(&map, width, known, other)?;
+    let compared = ComparedBrightness {
+        width,
+        columns: (0..width).map(|x| map.around(x as f64, columns)).collect(),
+        known,
+        other,
+    };
+    let before = compared.residual_std(&map)?;
     let mut scale = f64::INFINITY;
     for _ in 0..ROUNDS {
-        improve(&mut map, width, (known, other), scale);
-        scale = residual_std(&map, width, known, other)?;
+        compared.improve(&mut map, scale);
+        scale = compared.residual_std(&map)?;
     }
     (scale < most * before).then_some(map)
 }
 
-fn residual(map: &LightMap, width: usize, n: usize, (known, other): (f64, f64)) -> f64 {
-    let [gain, offset] = map.at((n % width) as f64, (n / width) as f64);
-    other - gain * known - offset
+/// Two brightnesses of all sites, row by row.
+struct ComparedBrightness<'a> {
+    width: usize,
+    /// The columns of nodes around each column, and the share of the second.
+    columns: Vec<(usize, usize, f64)>,
+    known: &'a [f64],
+    other: &'a [f64],
 }
 
-fn residual_std(map: &LightMap, width: usize, known: &[f64], other: &[f64]) -> Option<f64> {
-    let of_site = |n: usize| residual(map, width, n, (known[n], other[n])).abs();
-    let mut residuals = parallel::map_range(known.len(), SITES_PER_TASK, of_site);
-    residuals.retain(|residual| residual.is_finite());
-    if residuals.len() < MIN_PIXELS { None } else { robust_std(&mut residuals) }
+impl ComparedBrightness<'_> {
+    /// Residuals of the sites of row `y`.
+    fn residuals(&self, map: &LightMap, y: usize) -> impl Iterator<Item = f64> {
+        let (line, first) = (map.line(y as f64), y * self.width);
+        self.columns.iter().enumerate().map(move |(x, &(left, right, share))| {
+            let [gain, offset] = blend(&line[left], &line[right], share);
+            self.other[first + x] - gain * self.known[first + x] - offset
+        })
+    }
+
+    fn rows(&self) -> usize {
+        self.known.len() / self.width.max(1)
+    }
+
+    fn residual_std(&self, map: &LightMap) -> Option<f64> {
+        let of_row = |y: usize| self.residuals(map, y).map(f64::abs).filter(|r| r.is_finite()).collect::<Vec<_>>();
+        let mut residuals = parallel::map(0..self.rows(), of_row).concat();
+        if residuals.len() < MIN_PIXELS { None } else { robust_std(&mut residuals) }
+    }
+
+    /// Fits once, with robust weights for residuals of the standard deviation `scale`.
+    fn improve(&self, map: &mut LightMap, scale: f64) {
+        let inverse = 1.0 / (HALF_WEIGHT_RESIDUAL * scale).max(f64::MIN_POSITIVE);
+        // Of weights, of both brightnesses and of their squares: at the nodes, on a row's columns of nodes.
+        let mut sums = vec![[0.0; 5]; map.nodes.len()];
+        let mut line = vec![[0.0; 5]; map.columns];
+        for y in 0..self.rows() {
+            line.fill([0.0; 5]);
+            for (x, residual) in self.residuals(map, y).enumerate().filter(|(_, residual)| residual.is_finite()) {
+                let (a, b) = (self.known[y * self.width + x], self.other[y * self.width + x]);
+                let weight = 1.0 / (1.0 + (residual * inverse).powi(2));
+                let terms = [weight, weight * a, weight * b, weight * a * a, weight * b * b];
+                let (left, right, share) = self.columns[x];
+                for (column, share) in [(left, 1.0 - share), (right, share)] {
+                    add(&mut line[column], share, &terms);
+                }
+            }
+            let (above, below, share) = map.around(y as f64, map.rows);
+            for (row, share) in [(above, 1.0 - share), (below, share)] {
+                let nodes = sums[row * map.columns..].iter_mut().zip(&line);
+                nodes.for_each(|(sums, terms)| add(sums, share, terms));
+            }
+        }
+        let mut whole = [0.0; 5];
+        for sums in &sums {
+            add(&mut whole, 1.0, sums);
+        }
+        let share = WHOLE_SHARE / map.nodes.len() as f64;
+        for (node, sums) in map.nodes.iter_mut().zip(&mut sums) {
+            add(sums, share, &whole);
+            let [a, b, aa, bb] = [1, 2, 3, 4].map(|k| sums[k] / sums[0].max(f64::MIN_POSITIVE));
+            let gain = ((bb - b * b) / (aa - a * a)).sqrt().clamp(GAIN_BOUNDS[0], GAIN_BOUNDS[1]);
+            if gain.is_finite() {
+                *node = [gain, b - gain * a];
+            }
+        }
+    }
 }
 
-/// Fits once, with robust weights for residuals of the standard deviation `scale`.
-fn improve(map: &mut LightMap, width: usize, (known, other): (&[f64], &[f64]), scale: f64) {
-    let inverse = 1.0 / (HALF_WEIGHT_RESIDUAL * scale).max(f64::MIN_POSITIVE);
-    // Of weights, of both brightnesses and of their squares.
-    let (mut sums, mut whole) = (vec![[0.0; 5]; map.nodes.len()], [0.0; 5]);
-    for (n, (a, b)) in known.iter().zip(other).enumerate().filter(|(_, (a, b))| (*a + *b).is_finite()) {
-        let weight = 1.0 / (1.0 + (residual(map, width, n, (*a, *b)) * inverse).powi(2));
-        let terms = [weight, weight * a, weight * b, weight * a * a, weight * b * b];
-        for (node, share) in map.around((n % width) as f64, (n / width) as f64) {
-            sums[node].iter_mut().zip(terms).for_each(|(sum, term)| *sum += share * term);
-        }
-        whole.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
-    }
-    let share = WHOLE_SHARE / map.nodes.len() as f64;
-    for (node, sums) in map.nodes.iter_mut().zip(&sums) {
-        let sums: [f64; 5] = std::array::from_fn(|k| sums[k] + share * whole[k]);
-        let [a, b, aa, bb] = [1, 2, 3, 4].map(|k| sums[k] / sums[0].max(f64::MIN_POSITIVE));
-        let gain = ((bb - b * b) / (aa - a * a)).sqrt().clamp(GAIN_BOUNDS[0], GAIN_BOUNDS[1]);
-        if gain.is_finite() {
-            *node = [gain, b - gain * a];
-        }
-    }
+fn add(sums: &mut [f64; 5], share: f64, terms: &[f64; 5]) {
+    sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += share * term);
 }
 
 /// A map on sites, of brightness `(I - mean) gain`, in units of the frames; `site`: distance of sites, px.

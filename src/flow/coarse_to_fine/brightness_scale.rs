@@ -20,18 +20,17 @@ const TRIMMED_FRACTION_DIVISOR: usize = 200;
 /// Minimum standard deviation over the mean; less is rounding.
 const MIN_STD_OVER_MEAN: f64 = 1e-12;
 
-/// Extent of the sorted `values` without the outermost and repeated extreme ones (missing data).
-fn trimmed_extent(values: &[f64]) -> f64 {
-    let (low, high) = (values[0], values[values.len() - 1]);
-    let start = if values.get(1) == Some(&low) { values.partition_point(|v| *v <= low) } else { 0 };
-    let end = if values.len() > 1 && values[values.len() - 2] == high {
-        values.partition_point(|v| *v < high)
-    } else {
-        values.len()
-    };
-    let inner = values.get(start..end).unwrap_or_default();
-    let cut = inner.len() / TRIMMED_FRACTION_DIVISOR;
-    if inner.is_empty() { 0.0 } else { inner[inner.len() - 1 - cut] - inner[cut] }
+/// Extent of the `values` without the outermost and repeated extreme ones (missing data); reorders them.
+fn trimmed_extent(values: &mut [f64]) -> f64 {
+    let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(low, high), &v| (low.min(v), high.max(v)));
+    let repeated = |extreme: f64| Some(values.iter().filter(|v| **v == extreme).count()).filter(|&count| count > 1);
+    let (start, end) = (repeated(low).unwrap_or(0), values.len() - repeated(high).unwrap_or(0));
+    if start >= end {
+        return 0.0;
+    }
+    let cut = (end - start) / TRIMMED_FRACTION_DIVISOR;
+    let mut place = |at: usize| *values.select_nth_unstable_by(at, f64::total_cmp).1;
+    place(end - 1 - cut) - place(start + cut)
 }
 
 /// Scaling of brightness: `(brightness - mean) gain`.
@@ -63,14 +62,18 @@ impl BrightnessScale {
         if values.is_empty() {
             return Self { mean: 0.0, gain: 1.0, contrast: 0.0 };
         }
-        values.sort_unstable_by(f64::total_cmp);
-        let cut = values.len() / 20;
-        let middle = &values[cut..values.len() - cut];
+        let extent = trimmed_extent(&mut values);
+        let (cut, count) = (values.len() / 20, values.len());
+        if cut > 0 {
+            values.select_nth_unstable_by(cut, f64::total_cmp);
+            values[cut..].select_nth_unstable_by(count - 2 * cut, f64::total_cmp);
+        }
+        let middle = &values[cut..count - cut];
         let mean = middle.iter().sum::<f64>() / middle.len() as f64;
         let deviation = |values: &[f64]| {
             (values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
         };
-        let robust = deviation(middle).max(MIN_STD_OVER_EXTENT * trimmed_extent(&values));
+        let robust = deviation(middle).max(MIN_STD_OVER_EXTENT * extent);
         // A picture with a single small spot has no other contrast.
         let deviation = Some(robust).filter(|&d| d > 0.0).unwrap_or_else(|| deviation(&values));
         let deviation = if deviation > MIN_STD_OVER_MEAN * mean.abs() { deviation } else { 0.0 };

@@ -24,7 +24,7 @@ use crate::ablation::keeps;
 use crate::image::Spline;
 use crate::math::median;
 use crate::parallel;
-use crate::simd::SimdReal;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::f64::consts::PI;
 
 /// Binomial means of the sums, so that windows have standard deviations of 3.4, 8.7 and 14.3 px.
@@ -35,8 +35,6 @@ const WINDOWS: [f64; 3] = [3.4, 8.7, 14.3];
 const PRIOR: f64 = 0.5;
 /// Maximum difference at a node, px: larger ones are of two motions.
 const MAX_DIFFERENCE: f64 = 0.1;
-/// Nodes of one task.
-const NODES_PER_TASK: usize = 128;
 /// Maximum components of a remainder, px.
 const MAX_REMAINDER: f64 = 1.0;
 /// The same, where the flow moves by it: larger ones are of two motions.
@@ -97,7 +95,7 @@ impl DetailBias {
         let smooth_std = residual_std.map(|std| T::from_f64(SMOOTHED_NOISE * std.to_f64()));
         let mut sums = [(&level.splines, residual_std), (&smoothed, smooth_std)].map(|(splines, std)| {
             term.linearise(level.size, &level.views_of(splines, ComparedFrames::All), motion, std, &mut data);
-            node_sums(&data, motion, size)
+            node_sums(plan.simd, &data, motion, size)
         });
         smoothed.into_iter().map(Spline::into_memory).for_each(|memory| space.keep(Planes::of_samples(memory)));
         space.keep(data);
@@ -178,52 +176,82 @@ impl DetailBias {
 }
 
 /// Sums in triangular windows around the nodes, row by row; they overlap by half.
-fn node_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, size: (usize, usize)) -> Vec<NodeSums> {
-    let add = |sum: &mut NodeSums, weight: f64, part: &NodeSums| {
-        sum.iter_mut().zip(part).for_each(|(sum, part)| *sum += weight * part);
-    };
-    let row = |y: usize| {
-        let sites = site_sums(data, motion, y);
+fn node_sums<T: SimdReal>(
+    simd: Level,
+    data: &Planes<T>,
+    motion: &Planes<T>,
+    (columns, rows): (usize, usize),
+) -> Vec<NodeSums> {
+    let row = |n: usize| {
+        let mut down = Planes::new(data.width, 1, NodeSums::default().len());
+        for (y, weight) in sites_around(n, data.height) {
+            dispatch(simd, AddSites { data, motion, y, weight, sums: &mut down });
+        }
         let node = |n: usize| {
-            let mut sum = NodeSums::default();
-            sites_around(n, data.width).for_each(|(x, weight)| add(&mut sum, weight, &sites[x]));
-            sum
+            let sum =
+                |k: usize| sites_around(n, data.width).map(|(x, weight)| weight * down.at(k, x, 0).to_f64()).sum();
+            std::array::from_fn(sum)
         };
-        (0..size.0).map(node).collect::<Vec<_>>()
+        (0..columns).map(node).collect::<Vec<NodeSums>>()
     };
-    let rows: Vec<Vec<NodeSums>> = parallel::map(0..data.height, row);
-    let nodes = |n: usize| {
-        let mut sum = NodeSums::default();
-        sites_around(n / size.0, data.height).for_each(|(y, weight)| add(&mut sum, weight, &rows[y][n % size.0]));
-        sum
-    };
-    parallel::map_range(size.0 * size.1, NODES_PER_TASK, nodes)
+    parallel::map(0..rows, row).concat()
 }
 
-/// Normal equations of the sites of a row for the flow that their motion, with its curvature, leaves.
-fn site_sums<T: SimdReal>(data: &Planes<T>, motion: &Planes<T>, y: usize) -> Vec<NodeSums> {
-    let lines: [&[T]; MOTION] = std::array::from_fn(|k| motion.line(k, y));
-    let normals = [0, 1].map(|c| std::array::from_fn::<_, MOTION, _>(|k| data.line(normal(c, k), y)));
-    let [right_u, right_v, errors] = [right(0), right(1), ERROR].map(|k| data.line(k, y));
-    let [above, below] = [y.saturating_sub(1), (y + 1).min(data.height - 1)].map(|y| [4, 5].map(|k| motion.line(k, y)));
-    // Over a site's window, curved flow has the mean `u + sigma^2 (u_xx + u_yy) / 2`. Second derivatives are
-    // differences of the slopes two sites apart; at a border of one site, half as large.
-    let square = if keeps("flow.window_curvature") { DataOptions::default().sigma.powi(2) } else { 0.0 };
-    let window = 0.5 * square / (2.0 * SITE_SPACING);
-    let site = |x: usize| {
-        let (before, after) = (x.saturating_sub(1), (x + 1).min(data.width - 1));
-        let mut known: [f64; MOTION] = std::array::from_fn(|k| lines[k][x].to_f64());
-        for c in 0..2 {
-            let change = lines[2 + c][after] - lines[2 + c][before] + below[c][x] - above[c][x];
-            known[c] += window * change.to_f64();
+/// Adds normal equations of the sites of row `y` for the flow that their motion, with its curvature, leaves.
+struct AddSites<'a, T> {
+    data: &'a Planes<T>,
+    motion: &'a Planes<T>,
+    y: usize,
+    weight: f64,
+    sums: &'a mut Planes<T>,
+}
+
+impl<T: SimdReal> Kernel<T> for AddSites<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let Self { data, motion, y, weight, sums } = self;
+        let (stride, weight) = (motion.stride(), V::constant(weight));
+        let (data, here, to) = (data.row(y), motion.row(y), sums.row_mut(0));
+        let (above, below) = (motion.row(y.saturating_sub(1)), motion.row((y + 1).min(motion.height - 1)));
+        // Over a site's window, curved flow has the mean `u + sigma^2 (u_xx + u_yy) / 2`. Second derivatives
+        // are differences of the slopes two sites apart; at a border of one site, half as large.
+        let square = if keeps("flow.window_curvature") { DataOptions::default().sigma.powi(2) } else { 0.0 };
+        let window = V::constant(0.5 * square / (2.0 * SITE_SPACING));
+        let mut slopes = here[2 * stride..4 * stride].to_vec();
+        for line in slopes.chunks_exact_mut(stride) {
+            (line[LEFT - 1], line[LEFT + motion.width]) = (line[LEFT], line[LEFT + motion.width - 1]);
         }
-        let left = |c: usize, right: &[T]| {
-            right[x].to_f64() - (0..MOTION).map(|k| normals[c][k][x].to_f64() * known[k]).sum::<f64>()
-        };
-        let [a, b, c] = [normals[0][0], normals[0][1], normals[1][1]].map(|line| line[x].to_f64());
-        [a, b, c, left(0, right_u), left(1, right_v), errors[x].to_f64()]
-    };
-    (0..data.width).map(site).collect()
+        for at in (LEFT..stride - LEFT).step_by(V::LANES) {
+            let mut known = [V::zero(); MOTION];
+            for (k, known) in known.iter_mut().enumerate() {
+                *known = V::load(&here[k * stride + at..]);
+            }
+            for c in 0..2 {
+                let (slope, across) = (c * stride + at, (4 + c) * stride + at);
+                let along = V::load(&slopes[slope + 1..]) - V::load(&slopes[slope - 1..]);
+                let change = along + (V::load(&below[across..]) - V::load(&above[across..]));
+                known[c] = change.mul_add(window, known[c]);
+            }
+            let planes = [normal(0, 0), normal(0, 1), normal(1, 1)];
+            for (k, plane) in planes.into_iter().enumerate() {
+                add(&mut to[k * stride + at..], weight, V::load(&data[plane * stride + at..]));
+            }
+            for c in 0..2 {
+                let mut left = V::load(&data[right(c) * stride + at..]);
+                for (k, &known) in known.iter().enumerate() {
+                    left = V::load(&data[normal(c, k) * stride + at..]).neg_mul_add(known, left);
+                }
+                add(&mut to[(3 + c) * stride + at..], weight, left);
+            }
+            add(&mut to[5 * stride + at..], weight, V::load(&data[ERROR * stride + at..]));
+        }
+    }
+}
+
+#[inline(always)]
+fn add<V: Lanes>(sum: &mut [V::Scalar], weight: V, value: V) {
+    value.mul_add(weight, V::load(sum)).store(sum);
 }
 
 /// Mean squares of vectors whose components are at most `most` px, with a standard deviation of 8 px around

@@ -39,21 +39,31 @@ pub(super) fn boundary_errors<T: SimdReal>(motion: &Planes<T>, (width, height): 
 
 /// Squared jumps `xx, xy, yy` of the flow at the sites of row `y`, px^2, times the share on the wrong side.
 fn jumps<T: SimdReal>(motion: &Planes<T>, y: usize) -> Vec<[f64; 3]> {
-    let below = (y + 1).min(motion.height - 1);
-    let site = |x: usize| {
-        let next = (x + 1).min(motion.width - 1);
-        // Along x and y, 1/frame: smooth motion of any strain has none.
-        let unexplained = |k: usize| {
-            [(next, y, 2), (x, below, 4)].map(|(i, j, slope)| {
-                let rise = (motion.at(k, i, j) - motion.at(k, x, y)).to_f64() / SITE_SPACING;
-                let slopes = (motion.at(k + slope, i, j) + motion.at(k + slope, x, y)).to_f64();
-                if (i, j) == (x, y) { 0.0 } else { rise - 0.5 * slopes }
-            })
-        };
-        let ([u_x, u_y], [v_x, v_y]) = (unexplained(0), unexplained(1));
+    let (width, last_row) = (motion.width, motion.height - 1);
+    let mut jumps = vec![[0.0; 4]; width];
+    for k in 0..2 {
+        let (flow, along) = (motion.line(k, y), motion.line(k + 2, y));
+        for x in 0..width - 1 {
+            jumps[x][k] = unexplained([flow[x], flow[x + 1]], [along[x], along[x + 1]]);
+        }
+        if y < last_row {
+            let (below, across, across_below) =
+                (motion.line(k, y + 1), motion.line(k + 4, y), motion.line(k + 4, y + 1));
+            for x in 0..width {
+                jumps[x][2 + k] = unexplained([flow[x], below[x]], [across[x], across_below[x]]);
+            }
+        }
+    }
+    let site = |[u_x, v_x, u_y, v_y]: [f64; 4]| {
         let squares = [u_x * u_x + u_y * u_y, u_x * v_x + u_y * v_y, v_x * v_x + v_y * v_y];
         let ratio = ((squares[0] + squares[2]) / BOUNDARY_STRAIN.powi(2)).powi(4);
-        squares.map(|square| OTHER_SIDE_SHARE * BOUNDARY_WIDTH.powi(2) * ratio / (1.0 + ratio) * square)
+        let share = OTHER_SIDE_SHARE * BOUNDARY_WIDTH.powi(2) * ratio / (1.0 + ratio);
+        squares.map(|square| share * square)
     };
-    (0..motion.width).map(site).collect()
+    jumps.into_iter().map(site).collect()
+}
+
+/// Strain between two neighbouring sites that their slopes do not explain, 1/frame: smooth motion has none.
+fn unexplained<T: SimdReal>([flow, next]: [T; 2], [slope, next_slope]: [T; 2]) -> f64 {
+    (next - flow).to_f64() / SITE_SPACING - 0.5 * (slope + next_slope).to_f64()
 }

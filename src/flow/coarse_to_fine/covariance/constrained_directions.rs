@@ -32,25 +32,27 @@ impl ConstrainedDirections {
         let node = |site: usize, count: usize| {
             ((site + SITES_PER_NODE / 2) / SITES_PER_NODE).min(count.div_ceil(SITES_PER_NODE) - 1)
         };
-        // Sums along each row first: they serve three rows.
-        let sums_along = |k: usize, y: usize| -> Vec<f64> {
-            let line = data.line(k, y);
-            (0..width).map(|x| line[around(x, width)].iter().map(|value| value.to_f64()).sum()).collect()
-        };
         let mut sites = vec![NONE; width * height];
         for_each_band(&mut sites, width, |_, rows, out| {
-            let reached = around(rows.start, height).start..around(rows.end - 1, height).end;
-            let sums = [UU, UV, VV].map(|k| reached.clone().map(|y| sums_along(k, y)).collect::<Vec<_>>());
+            let mut sums = [(); 3].map(|()| vec![0.0; width]);
             for (y, out) in rows.zip(out.chunks_exact_mut(width)) {
-                let rows = around(y, height);
+                let (rows, node_row) = (around(y, height), node(y, height));
+                for (sums, k) in sums.iter_mut().zip([UU, UV, VV]) {
+                    sums.fill(0.0);
+                    for y in rows.clone() {
+                        sums.iter_mut().zip(data.line(k, y)).for_each(|(sum, value)| *sum += value.to_f64());
+                    }
+                }
+                let sufficient: Vec<f64> = (0..nodes.0).map(|x| noise.sufficient_information(x, node_row)).collect();
                 for (x, out) in out.iter_mut().enumerate() {
-                    let count = (around(x, width).len() * rows.len()) as f64;
-                    let mean = |sums: &[Vec<f64>]| {
-                        let rows = rows.start - reached.start..rows.end - reached.start;
-                        sums[rows].iter().map(|sums| sums[x]).sum::<f64>() / count
-                    };
-                    let information = [mean(&sums[0]), mean(&sums[1]), mean(&sums[2])];
-                    *out = noise.unconstrained(information, node(x, width), node(y, height));
+                    let columns = around(x, width);
+                    let share = 1.0 / (columns.len() * rows.len()) as f64;
+                    let mean = |sums: &[f64]| share * sums[columns.clone()].iter().sum::<f64>();
+                    let [a, b, c] = [mean(&sums[0]), mean(&sums[1]), mean(&sums[2])];
+                    // The usual case, without a root.
+                    if 0.5 * (a + c) - (0.5 * (a - c).abs() + b.abs()) < sufficient[node(x, width)] {
+                        *out = noise.unconstrained([a, b, c], node(x, width), node_row);
+                    }
                 }
             }
         });

@@ -9,14 +9,14 @@
 //! measured with a Gaussian of [`FIXED_SIGMA`]. The chosen windows differ, so the motion loses `(1 - G)^4`,
 //! as it does in them, to Gaussians that are somewhat wider, with the weights of the windows.
 
-use super::{Entries, NODES_PER_TASK};
+use super::Entries;
 use crate::flow::coarse_to_fine::data_term::MOTION;
 use crate::flow::coarse_to_fine::nodes::binomial_mean;
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, TERMS, WindowStatistics};
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::parallel;
-use crate::simd::SimdReal;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use std::f64::consts::SQRT_2;
 
 /// Standard deviation of the fixed Gaussian, px: about twice that of the windows chosen in curved flow.
@@ -38,13 +38,16 @@ pub(super) struct Shares {
 }
 
 pub(super) fn curvature_bias<T: SimdReal>(
+    simd: Level,
     motion: &Planes<T>,
     statistics: &WindowStatistics<T>,
     shares: Shares,
 ) -> Vec<Entries> {
     let size = statistics.size();
     let mut products = vec![[0.0; ENTRIES]; size.0 * size.1];
-    for (losses, shares) in [(lost(motion, size), shares.fixed), (lost_to_windows(motion, statistics), shares.chosen)] {
+    for (losses, shares) in
+        [(lost(motion, size), shares.fixed), (lost_to_windows(simd, motion, statistics), shares.chosen)]
+    {
         for (out, loss) in products.iter_mut().zip(losses) {
             add_loss(out, &loss, shares);
         }
@@ -74,21 +77,19 @@ pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, (x, y): (usize, usize))
 fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec<Loss> {
     // G and G G.
     let kernels = [FIXED_SIGMA / SITE_SPACING, FIXED_SIGMA / SITE_SPACING * SQRT_2];
-    let along = kernels.map(|s| gaussians(s, (width, SITES_PER_NODE), motion.width));
-    let across = kernels.map(|s| gaussians(s, (height, SITES_PER_NODE), motion.height));
+    let along = kernels.map(|s| gaussians::<T>(s, (width, SITES_PER_NODE), motion.width));
+    let across = kernels.map(|s| gaussians::<T>(s, (height, SITES_PER_NODE), motion.height));
     let rows: Vec<Vec<Loss>> = parallel::map(0..height, |y| {
         let mut lost: Vec<Loss> = (0..width).map(|x| motion_at(motion, (x, y))).collect();
         let mut down = vec![T::from_f64(0.0); motion.width];
         for k in 0..MOTION {
             for (factor, (across, along)) in [-2.0, 1.0].into_iter().zip(across.iter().zip(&along)) {
                 down.fill(T::from_f64(0.0));
-                for &(site, weight) in &across[y] {
-                    let weight = T::from_f64(weight);
+                for (site, &weight) in (across[y].first..).zip(&across[y].weights) {
                     down.iter_mut().zip(motion.line(k, site)).for_each(|(d, m)| *d += weight * *m);
                 }
                 for (lost, taps) in lost.iter_mut().zip(along) {
-                    let sum: f64 = taps.iter().map(|&(site, weight)| weight * down[site].to_f64()).sum();
-                    lost[k] += factor * sum;
+                    lost[k] += factor * dot(&down[taps.first..], &taps.weights).to_f64();
                 }
             }
         }
@@ -97,14 +98,31 @@ fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec
     rows.concat()
 }
 
+/// Sum of products of the `weights` with as many values, in parts of known length, so that the compiler uses
+/// lanes.
+fn dot<T: SimdReal>(values: &[T], weights: &[T]) -> T {
+    const PART: usize = 8;
+    let zero = T::from_f64(0.0);
+    let (values, last_values) = values[..weights.len()].as_chunks::<PART>();
+    let (weights, last_weights) = weights.as_chunks::<PART>();
+    let mut sums = [zero; PART];
+    for (values, weights) in values.iter().zip(weights) {
+        (0..PART).for_each(|i| sums[i] += weights[i] * values[i]);
+    }
+    for (sum, (&value, &weight)) in sums.iter_mut().zip(last_values.iter().zip(last_weights)) {
+        *sum += weight * value;
+    }
+    sums.into_iter().sum()
+}
+
 /// The sum over the windows of weight times `(1 - G)^4` of the motion, G wider than the window by
 /// [`CHOSEN_SIGMA_FACTOR`]. The motion there is smooth enough to be smoothed from node to node.
-fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, statistics: &WindowStatistics<T>) -> Vec<Loss> {
+fn lost_to_windows<T: SimdReal>(simd: Level, motion: &Planes<T>, statistics: &WindowStatistics<T>) -> Vec<Loss> {
     let (width, height) = statistics.size();
     let nodes: Vec<(usize, usize)> = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).collect();
-    let whole: Vec<Loss> = nodes.iter().map(|&at| motion_at(motion, at)).collect();
+    let whole: Vec<Padded> = nodes.iter().map(|&at| padded(&motion_at(motion, at))).collect();
     let mut lost = vec![[0.0; MOTION]; whole.len()];
-    let (mut left, mut rows) = (lost.clone(), lost.clone());
+    let (mut left, mut rows) = (whole.clone(), whole.clone());
     for (l, sigma) in statistics.sigmas.iter().enumerate().filter(|(_, s)| **s >= MIN_CHOSEN_SIGMA) {
         let weights: Vec<[f64; 2]> = nodes.iter().map(|&(x, y)| statistics.weights(l, x, y)).collect();
         if weights.iter().flatten().all(|w| *w < 0.01) {
@@ -112,9 +130,14 @@ fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, statistics: &WindowStatistic
         }
         left.copy_from_slice(&whole);
         let sigma = CHOSEN_SIGMA_FACTOR * sigma / (SITE_SPACING * SITES_PER_NODE as f64);
-        let taps = (gaussians(sigma, (width, 1), width), gaussians(sigma, (height, 1), height));
+        let (along, across) = (gaussians(sigma, (width, 1), width), gaussians(sigma, (height, 1), height));
         for _ in TERMS {
-            subtract_smooth(&mut left, &mut rows, &taps);
+            parallel::for_each(rows.chunks_mut(width).enumerate(), |(y, out)| {
+                dispatch(simd, MeanAlong { from: &left[y * width..][..width], taps: &along, out });
+            });
+            parallel::for_each(left.chunks_mut(width).enumerate(), |(y, out)| {
+                dispatch(simd, SubtractMean { rows: &rows, taps: &across[y], out });
+            });
         }
         for ((lost, weight), left) in lost.iter_mut().zip(weights).zip(&left) {
             (0..MOTION).for_each(|k| lost[k] += weight[usize::from(k >= 2)] * left[k]);
@@ -123,32 +146,69 @@ fn lost_to_windows<T: SimdReal>(motion: &Planes<T>, statistics: &WindowStatistic
     lost
 }
 
-/// Subtracts the smoothed `values` from them; `rows` is scratch memory.
-fn subtract_smooth(values: &mut [Loss], rows: &mut [Loss], (along, across): &(Vec<Taps>, Vec<Taps>)) {
-    let width = along.len();
-    let mean = |from: &[Loss], taps: &Taps, first: usize, step: usize| {
-        let mut sum = [0.0; MOTION];
-        for &(n, weight) in taps {
-            let value = &from[first + step * n];
-            (0..MOTION).for_each(|k| sum[k] += weight * value[k]);
-        }
-        sum
-    };
-    parallel::for_each_value(rows, NODES_PER_TASK, |n, out| {
-        *out = mean(values, &along[n % width], n - n % width, 1);
-    });
-    parallel::for_each_value(values, NODES_PER_TASK, |n, value| {
-        let smooth = mean(rows, &across[n / width], n % width, width);
-        (0..MOTION).for_each(|k| value[k] -= smooth[k]);
-    });
+/// A loss in memory that lanes of every length fill.
+type Padded = [f64; 8];
+
+fn padded(loss: &Loss) -> Padded {
+    std::array::from_fn(|k| loss.get(k).copied().unwrap_or(0.0))
 }
 
-/// Sites and their weights.
-type Taps = Vec<(usize, f64)>;
+/// Means along a row of nodes.
+struct MeanAlong<'a> {
+    from: &'a [Padded],
+    taps: &'a [Taps<f64>],
+    out: &'a mut [Padded],
+}
+
+impl Kernel<f64> for MeanAlong<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) {
+        for (out, taps) in self.out.iter_mut().zip(self.taps) {
+            let values = &self.from[taps.first..][..taps.weights.len()];
+            for part in (0..out.len()).step_by(V::LANES) {
+                let mut sum = V::zero();
+                for (value, &weight) in values.iter().zip(&taps.weights) {
+                    sum = V::load(&value[part..]).mul_add(V::splat(weight), sum);
+                }
+                sum.store(&mut out[part..]);
+            }
+        }
+    }
+}
+
+/// Subtracts the means down the columns from a row of nodes.
+struct SubtractMean<'a> {
+    rows: &'a [Padded],
+    taps: &'a Taps<f64>,
+    out: &'a mut [Padded],
+}
+
+impl Kernel<f64> for SubtractMean<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) {
+        let Self { rows, taps, out } = self;
+        for (row, &weight) in rows.chunks_exact(out.len()).skip(taps.first).zip(&taps.weights) {
+            for (out, value) in out.iter_mut().zip(row) {
+                for part in (0..out.len()).step_by(V::LANES) {
+                    let left = V::load(&value[part..]).neg_mul_add(V::splat(weight), V::load(&out[part..]));
+                    left.store(&mut out[part..]);
+                }
+            }
+        }
+    }
+}
+
+/// Weights of sites, from `first` on.
+struct Taps<T> {
+    first: usize,
+    weights: Vec<T>,
+}
 
 /// A Gaussian of `sigma` sites about each of `nodes` positions, `spacing` apart. Beyond the edges values are
 /// reflected at the point on the edge, so that affine motion has no loss.
-fn gaussians(sigma: f64, (nodes, spacing): (usize, usize), sites: usize) -> Vec<Taps> {
+fn gaussians<T: SimdReal>(sigma: f64, (nodes, spacing): (usize, usize), sites: usize) -> Vec<Taps<T>> {
     let radius = (3.0 * sigma).ceil() as isize;
     let raw: Vec<f64> = (-radius..=radius).map(|k| (-0.5 * (k as f64 / sigma).powi(2)).exp()).collect();
     let total: f64 = raw.iter().sum();
@@ -167,7 +227,9 @@ fn gaussians(sigma: f64, (nodes, spacing): (usize, usize), sites: usize) -> Vec<
                     weights[(2 * edge - at).clamp(0, last) as usize] -= w;
                 }
             }
-            weights.into_iter().enumerate().filter(|(_, w)| *w != 0.0).collect()
+            let first = weights.iter().position(|w| *w != 0.0).unwrap_or(0);
+            let end = weights.iter().rposition(|w| *w != 0.0).map_or(first, |last| last + 1);
+            Taps { first, weights: weights[first..end].iter().map(|&w| T::from_f64(w)).collect() }
         })
         .collect()
 }

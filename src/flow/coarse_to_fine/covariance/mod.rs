@@ -34,7 +34,7 @@ use super::{estimate::Estimate, nodes::NodeAxis, peak_locking::PeakLocking, plan
 use crate::ablation::keeps;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::parallel;
-use crate::simd::SimdReal;
+use crate::simd::{Level, SimdReal};
 use boundary_error::boundary_errors;
 use coarse_level_error::{CoarseLevelError, CoarseLevelErrors};
 use constrained_directions::ConstrainedDirections;
@@ -97,6 +97,7 @@ pub(super) struct CovarianceMaps<T> {
 /// `energy`: residual energy of the noise. `with_systematic`: also the systematic part, everything but noise
 /// and a share of the noise.
 pub(super) fn covariance<T: SimdReal>(
+    simd: Level,
     estimate: &Estimate<T>,
     energy: Energy,
     is_pair: bool,
@@ -118,7 +119,7 @@ pub(super) fn covariance<T: SimdReal>(
             let constrained = ConstrainedDirections::new(&estimate.data, &noise, (width, height));
             CoarseLevelErrors::new(&estimate.motion, &estimate.coarser_motions, constrained).at_nodes((width, height))
         },
-        || curvature_bias::curvature_bias(&estimate.motion, statistics, CURVATURE_SHARES[kind]),
+        || curvature_bias::curvature_bias(simd, &estimate.motion, statistics, CURVATURE_SHARES[kind]),
     );
     let change = estimate.acceleration.as_ref();
     let change = change.map(|statistics| {

@@ -155,20 +155,20 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         self.excess * energy * best <= MAX_TEXTURED_DENSITY
     }
 
+    /// Mean information of the sites near a node with which data constrain the motion.
+    pub fn sufficient_information(&self, x: usize, y: usize) -> f64 {
+        (self.white_information + MIN_CONSTRAINING_INFORMATION) * self.energy(x, y)
+    }
+
     /// Directions in which this mean information of the sites near a node does not constrain the motion.
     pub fn unconstrained(&self, [a, b, c]: [f64; 3], x: usize, y: usize) -> UnconstrainedDirections {
         let (middle, half) = (0.5 * (a + c), 0.5 * (a - c));
-        let energy = self.energy(x, y);
-        let beyond = |share: f64| (self.white_information + share) * energy;
-        // The usual case, without a root.
-        if middle - (half.abs() + b.abs()) >= beyond(MIN_CONSTRAINING_INFORMATION) {
-            return NONE;
-        }
         let radius = half.hypot(b);
-        if middle - radius >= beyond(MIN_CONSTRAINING_INFORMATION) {
+        if middle - radius >= self.sufficient_information(x, y) {
             return NONE;
         }
-        if middle + radius < beyond(MIN_INFORMATION_OF_ONE_DIRECTION) || radius <= 0.0 {
+        let sufficient = (self.white_information + MIN_INFORMATION_OF_ONE_DIRECTION) * self.energy(x, y);
+        if middle + radius < sufficient || radius <= 0.0 {
             return ALL;
         }
         // The direction with the least information.

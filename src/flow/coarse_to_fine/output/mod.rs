@@ -43,7 +43,7 @@ pub(super) fn covariance_of<T: SimdReal>(
         // Rounding is the minimum noise of integer samples.
         None => Energy::AtLeast(energy_of(if are_rounded(frames) { 1.0 / 12.0 } else { 0.0 })),
     };
-    covariance(estimate, noise, frames.len() == 2, common.systematic)
+    covariance(common.level(), estimate, noise, frames.len() == 2, common.systematic)
 }
 
 /// Writes the estimate and its covariance at the field's sites, a pair's at the first frame.

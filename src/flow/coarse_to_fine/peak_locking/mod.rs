@@ -11,13 +11,14 @@
 //! aliased waves change their sign and everything else stays. Half the difference of the two right sides is
 //! the contribution of the aliases, regressed here on the sine over patches all over the frame.
 
-use super::data_term::{DataOptions, View};
+use super::data_term::{DataOptions, View, is_usable};
 use super::planes::{LEFT, Planes};
 use super::pyramid::{ComparedFrames, PyramidLevel};
 use crate::ablation::keeps;
 use crate::math::{median, robust_std};
 use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use crate::types::Mask;
 use std::f64::consts::{PI, TAU};
 
 /// Samples along a patch's side; the outermost only serve the stencils.
@@ -136,7 +137,7 @@ struct Sums {
 struct Patch {
     corner: (usize, usize),
     flow: [[f64; SAMPLES]; 2],
-    sine: [[f64; SAMPLES]; 2],
+    cycles: f64,
 }
 
 impl Patch {
@@ -145,15 +146,16 @@ impl Patch {
         let mut flow = [[0.0; SAMPLES]; 2];
         let last = (motion.width - 1, motion.height - 1);
         for (k, flow) in flow.iter_mut().enumerate() {
-            for (i, flow) in flow.iter_mut().enumerate() {
-                let (x, y) = (corner.0 + i % SIDE, corner.1 + i / SIDE);
-                let (right, below) = (x.div_ceil(2).min(last.0), y.div_ceil(2).min(last.1));
-                let at = |x: usize, y: usize| motion.at(k, x, y).to_f64();
-                *flow = 0.25 * (at(x / 2, y / 2) + at(right, y / 2) + at(x / 2, below) + at(right, below));
+            for (y, flow) in (corner.1..).zip(flow.chunks_exact_mut(SIDE)) {
+                let [upper, lower] = [y / 2, y.div_ceil(2).min(last.1)].map(|y| motion.line(k, y));
+                for (x, flow) in (corner.0..).zip(flow) {
+                    let (left, right) = (x / 2, x.div_ceil(2).min(last.0));
+                    let around = [upper[left], upper[right], lower[left], lower[right]];
+                    *flow = 0.25 * around.map(T::to_f64).iter().sum::<f64>();
+                }
             }
         }
-        let sine = flow.map(|flow| flow.map(|u| (TAU * cycles * u).sin()));
-        Self { corner, flow, sine }
+        Self { corner, flow, cycles }
     }
 
     /// `None` where a frame is not usable.
@@ -166,18 +168,10 @@ impl Patch {
     ) -> Option<[Sums; 2]> {
         let here = self.warped(simd, views, size, [0.0, 0.0])?;
         let mut out = [Sums::default(); 2];
-        for (c, out) in out.iter_mut().enumerate() {
-            let shifted = self.warped(simd, views, size, if c == 0 { [0.5, 0.0] } else { [0.0, 0.5] })?;
-            for y in 1..SIDE - 1 {
-                for i in y * SIDE + 1..(y + 1) * SIDE - 1 {
-                    let (residual, normal, right) = here.row(i, c);
-                    let (_, normal_aside, right_aside) = shifted.row(i, c);
-                    let robust = 1.0 / (1.0 + (residual * inverse).powi(2));
-                    let sine = self.sine[c][i];
-                    out.product += 0.5 * robust * sine * (right_aside - right);
-                    out.weight += 0.5 * robust * sine * sine * (normal + normal_aside);
-                }
-            }
+        for (axis, out) in out.iter_mut().enumerate() {
+            let aside = self.warped(simd, views, size, if axis == 0 { [0.5, 0.0] } else { [0.0, 0.5] })?;
+            let (flow, cycles) = (&self.flow[axis], self.cycles);
+            *out = dispatch(simd, SumRows { here: &here, aside: &aside, axis, flow, cycles, inverse });
         }
         Some(out)
     }
@@ -190,59 +184,123 @@ impl Patch {
         (width, height): (usize, usize),
         shift: [f64; 2],
     ) -> Option<Warped> {
-        let mut out = Warped { mean: [0.0; SAMPLES], rate: [0.0; SAMPLES] };
+        let mut out = Warped { mean: [0.0; PADDED], rate: [0.0; PADDED] };
         let (mut x, mut y) = ([T::from_f64(0.0); SAMPLES], [T::from_f64(0.0); SAMPLES]);
         let mut values = [T::from_f64(0.0); SAMPLES];
+        let corner = [self.corner.0 as f64 + shift[0], self.corner.1 as f64 + shift[1]];
+        let (right, low) = (width as f64 - 2.0, height as f64 - 2.0);
         for view in views {
             let time = view.time.to_f64();
+            let mut is_inside = true;
             for i in 0..SAMPLES {
-                let column = (self.corner.0 + i % SIDE) as f64 + shift[0] + time * self.flow[0][i];
-                let row = (self.corner.1 + i / SIDE) as f64 + shift[1] + time * self.flow[1][i];
-                let inside = column >= 1.0 && row >= 1.0 && column <= width as f64 - 2.0 && row <= height as f64 - 2.0;
-                let usable =
-                    inside && view.usable.is_none_or(|mask| mask.get(column.round() as usize, row.round() as usize));
-                if !usable {
-                    return None;
-                }
+                let column = corner[0] + (i % SIDE) as f64 + time * self.flow[0][i];
+                let row = corner[1] + (i / SIDE) as f64 + time * self.flow[1][i];
+                // Without a short circuit, so that the compiler uses lanes.
+                is_inside &= column >= 1.0;
+                is_inside &= row >= 1.0;
+                is_inside &= column <= right;
+                is_inside &= row <= low;
                 (x[i], y[i]) = (T::from_f64(column), T::from_f64(row));
             }
+            let is_usable = |mask: &Mask| x.iter().zip(&y).all(|(&x, &y)| is_usable(mask, x, y));
+            if !is_inside || !view.usable.is_none_or(is_usable) {
+                return None;
+            }
             view.spline.sample_row(simd, &x, &y, &mut values);
-            let (mean, rate) = (view.mean.to_f64(), view.rate.to_f64());
-            for (i, value) in values.iter().enumerate() {
-                out.mean[i] += mean * value.to_f64();
-                out.rate[i] += rate * value.to_f64();
+            for (out, share) in [(&mut out.mean, view.mean), (&mut out.rate, view.rate)] {
+                let share = share.to_f64();
+                out[SIDE..].iter_mut().zip(&values).for_each(|(out, value)| *out += share * value.to_f64());
             }
         }
         Some(out)
     }
 }
 
+/// Samples of a patch, with a row of zeros on either side.
+const PADDED: usize = SAMPLES + 2 * SIDE;
+/// 1 on the columns of a patch that have neighbours.
+const INNER: [f64; SIDE] = {
+    let mut inner = [1.0; SIDE];
+    (inner[0], inner[SIDE - 1]) = (0.0, 0.0);
+    inner
+};
+
 struct Warped {
-    mean: [f64; SAMPLES],
-    rate: [f64; SAMPLES],
+    mean: [f64; PADDED],
+    rate: [f64; PADDED],
 }
 
-impl Warped {
-    /// Residual, entry of the normal matrix and right side along the axis `c`, as in the data term.
-    fn row(&self, i: usize, c: usize) -> (f64, f64, f64) {
-        let gradient = DataOptions::default().gradient.powi(2);
-        // Steps along the axis and across it.
-        let (a, b) = if c == 0 { (1, SIDE) } else { (SIDE, 1) };
-        let (mean, rate) = (&self.mean, &self.rate);
-        let value = |p: &[f64; SAMPLES], i: usize, step: usize| (p[i - step] + 4.0 * p[i] + p[i + step]) * (1.0 / 6.0);
-        let smooth = |p: &[f64; SAMPLES], [before, here, after]: [usize; 3], step: usize| {
-            [value(p, before, step), value(p, here, step), value(p, after, step)]
+/// Sums over the inner samples of a patch, from its views `here` and half a pixel `aside` along the axis.
+struct SumRows<'a> {
+    here: &'a Warped,
+    aside: &'a Warped,
+    axis: usize,
+    flow: &'a [f64; SAMPLES],
+    cycles: f64,
+    /// 1 / (c s), the inverse of the residual at which a pixel has weight 1/2.
+    inverse: f64,
+}
+
+impl Kernel<f64> for SumRows<'_> {
+    type Output = Sums;
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = f64>>(self) -> Sums {
+        let Self { here, aside, axis, flow, cycles, inverse } = self;
+        let (mut product, mut weight) = (V::zero(), V::zero());
+        for i in (SIDE..SAMPLES - SIDE).step_by(V::LANES) {
+            let (residual, normal, right) = row::<V>(here, SIDE + i, axis);
+            let (_, normal_aside, right_aside) = row::<V>(aside, SIDE + i, axis);
+            let deviation = residual * V::splat(inverse);
+            let robust = V::constant(0.5) / deviation.mul_add(deviation, V::constant(1.0));
+            let sine = sine(V::load(&flow[i..]) * V::splat(cycles)) * V::load(&INNER[i % SIDE..]);
+            let share = robust * sine;
+            product = share.mul_add(right_aside - right, product);
+            weight = (share * sine).mul_add(normal + normal_aside, weight);
+        }
+        let sum = |lanes: V| {
+            let mut values = [0.0; SIDE];
+            lanes.store(&mut values);
+            values.iter().sum()
         };
-        let slope = |[before, _, after]: [f64; 3]| 0.5 * (after - before);
-        let across = smooth(mean, [i - a, i, i + a], b);
-        let (first, second) = (slope(across), across[0] - 2.0 * across[1] + across[2]);
-        let mixed = 0.25 * (mean[i + a + b] - mean[i + a - b] - mean[i - a + b] + mean[i - a - b]);
-        let rates = smooth(rate, [i - a, i, i + a], b);
-        let (along, other) = (slope(rates), slope(smooth(rate, [i - b, i, i + b], a)));
-        let residual = (rates[0] + 4.0 * rates[1] + rates[2]) / 6.0;
-        let normal = first * first + gradient * (second * second + mixed * mixed);
-        (residual, normal, first * residual + gradient * (second * along + mixed * other))
+        Sums { product: sum(product), weight: sum(weight) }
     }
+}
+
+/// Residual, entry of the normal matrix and right side along an axis, as in the data term, at the samples
+/// from `at` on.
+#[inline(always)]
+fn row<V: Lanes<Scalar = f64>>(warped: &Warped, at: usize, axis: usize) -> (V, V, V) {
+    let gradient = V::constant(DataOptions::default().gradient.powi(2));
+    let half = V::constant(0.5);
+    // Steps along the axis and across it.
+    let (a, b) = if axis == 0 { (1, SIDE) } else { (SIDE, 1) };
+    let (mean, rate) = (around::<V>(&warped.mean, at, (a, b)), around::<V>(&warped.rate, at, (a, b)));
+    let across = [value(mean[0]), value(mean[1]), value(mean[2])];
+    let (first, second) = (half * (across[2] - across[0]), across[0] + across[2] - (across[1] + across[1]));
+    let mixed = V::constant(0.25) * (mean[2][2] - mean[2][0] - mean[0][2] + mean[0][0]);
+    let rates = [value(rate[0]), value(rate[1]), value(rate[2])];
+    let (before, after) = ([rate[0][0], rate[1][0], rate[2][0]], [rate[0][2], rate[1][2], rate[2][2]]);
+    let (along, other) = (half * (rates[2] - rates[0]), half * (value(after) - value(before)));
+    let residual = value(rates);
+    let normal = first.mul_add(first, gradient * second.mul_add(second, mixed * mixed));
+    (residual, normal, first.mul_add(residual, gradient * second.mul_add(along, mixed * other)))
+}
+
+/// Samples one step before, at and after `at` along the axis, each with those across it.
+#[inline(always)]
+fn around<V: Lanes<Scalar = f64>>(plane: &[f64; PADDED], at: usize, (a, b): (usize, usize)) -> [[V; 3]; 3] {
+    let load = |at: usize| V::load(&plane[at..]);
+    let mut out = [[V::zero(); 3]; 3];
+    for (line, at) in out.iter_mut().zip([at - a, at, at + a]) {
+        *line = [load(at - b), load(at), load(at + b)];
+    }
+    out
+}
+
+/// `[1, 4, 1] / 6`.
+#[inline(always)]
+fn value<V: Lanes>([before, here, after]: [V; 3]) -> V {
+    here.mul_add(V::constant(4.0), before + after) * V::constant(1.0 / 6.0)
 }
 
 struct Correct<'a, T> {
