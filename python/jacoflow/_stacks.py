@@ -82,13 +82,24 @@ def _presented(frame: Frame, request: Request) -> Frame:
     return luminance(np.ascontiguousarray(frame[..., :3]))
 
 
-def _stack(request: Request, shape: tuple[int, ...], get: Callable[[int], Frame], whole: Callable[[], Frame]) -> Stack:
-    """A stack (T, H, W) or (T, H, W, C), or one frame (H, W), in colour (H, W, 3 or 4)."""
+def _stack(
+    request: Request, shape: tuple[int, ...], get: Callable[[int], Frame], whole: Callable[[], Frame], *, is_time_last: bool = False
+) -> Stack:
+    """A stack (T, H, W) or (T, H, W, C), with `is_time_last` (H, W, T) or (H, W, C, T), or one frame (H, W),
+    in colour (H, W, 3 or 4)."""
     match shape:
         case (_, _):
             return Stack(request, 1, lambda _: whole())
-        case (_, _, 3 | 4) if request.colour == "rgb":
+        case (_, _, 3 | 4) if request.colour in ("luminance", "rgb"):
             return Stack(request, 1, lambda _: whole())
+        case (_, rows, 3 | 4 as columns) if rows > 4 and not is_time_last:
+            raise FormatError(
+                f"{request.source}: expected a stack (T, H, W), got shape {shape}: one colour picture, or frames {columns} px wide; "
+                'for a picture ask for luminance by colour="luminance" (or "rgb"), or transpose a stack to (T, H, W)'
+            )
+    if is_time_last:
+        shape = (*shape[-1:], *shape[:-1])
+    match shape:
         case (count, _, _) | (count, _, _, 1 | 3 | 4):
             return Stack(request, count, get)
     raise FormatError(f"{request.source}: expected a stack (T, H, W), a frame (H, W) or colour (T, H, W, 3), got shape {shape}")
@@ -144,7 +155,7 @@ def open_hdf5(request: Request) -> Stack:
 
 
 def open_matlab(request: Request) -> Stack:
-    """The array (H, W, T), rows x columns x time, in a MATLAB file; colour (H, W, 3, T)."""
+    """The array (H, W, T), rows x columns x time, in a MATLAB file; colour (H, W, 3, T) or (H, W, 3)."""
     with open(request.source, "rb") as file:
         head = file.read(128)
     # HDF5 behind a block of its own, whose text says so.
@@ -159,9 +170,7 @@ def open_matlab(request: Request) -> Stack:
         array = _old_matlab(request)
         shape = array.shape
         get, whole = (lambda k: array[..., k]), (lambda: array)
-    if len(shape) == 2 or (request.colour == "rgb" and len(shape) == 3 and shape[2] in (3, 4)):
-        return Stack(request, 1, lambda _: whole())
-    return _stack(request, (shape[-1], *shape[:-1]), get, whole)
+    return _stack(request, shape, get, whole, is_time_last=True)
 
 
 def _old_matlab(request: Request) -> Frame:
@@ -171,9 +180,14 @@ def _old_matlab(request: Request) -> Frame:
     shapes = {name: shape for name, shape, kind in listed if kind in kinds}
     for name, _, kind in listed:
         if name not in shapes and (name == request.key or (request.key is None and not shapes)):
+            kind, taken = {
+                "struct": (kind, f"frames = {name}.frames; "),
+                "cell": ("cell array", f"frames = cat(3, {name}{{:}}); "),
+                "sparse": ("sparse array", f"frames = full({name}); "),
+            }.get(kind, (kind, ""))
             raise FormatError(
                 f"{request.source}: {name} is a {kind}; expected an array of numbers. In MATLAB save the frames as "
-                f"a variable of their own (of a struct: frames = {name}.frames; save('frames.mat', 'frames')), or in "
+                f"a variable of their own ({taken}save('frames.mat', 'frames')), or in "
                 f"Python take them out of scipy.io.loadmat(path, simplify_cells=True)[{name!r}] and pass the array"
             )
     name = _chosen(request, shapes)

@@ -82,8 +82,9 @@ def frames(
 
     Frames are grey, arrays (H, W); colour is refused unless `colour="luminance"`. With `colour="rgb"` they
     are arrays (H, W, 3) of red, green and blue; grey is then refused with `FormatError` unless
-    `grey="repeat"`, which takes its level for all three. Y4M is converted by ITU-R BT.601, limited range
-    unless its header says XCOLORRANGE=FULL.
+    `grey="repeat"`, which takes its level for all three. With either of the two an array
+    (H, W, 3 or 4) is one picture; without them it is refused as ambiguous, except in .mat, where it is 3 or 4
+    frames. Y4M is converted by ITU-R BT.601, limited range unless its header says XCOLORRANGE=FULL.
 
     Levels are the file's where its white is 255 or 65535, or unknown (floats, arrays); others are brought to
     the white of uint8 or uint16 (PNM of another maximum, PNG and TIFF of under 8 bits, Y4M of 9 to 15). TIFF

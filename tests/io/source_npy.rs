@@ -24,7 +24,7 @@ fn all(path: &Path) -> Vec<AnyFrame> {
 #[test]
 fn both_orders_give_the_same_frames() {
     let folder = tempfile::tempdir().unwrap();
-    let (t, h, w) = (5, 3, 4);
+    let (t, h, w) = (5, 3, 6);
     let value = |i: usize, y: usize, x: usize| (100 * i + 10 * y + x) as u16;
     let want: Vec<_> = (0..t).map(|i| AnyFrame::U16(Frame::from_fn(w, h, |x, y| value(i, y, x)))).collect();
     let mut c_order = Vec::new();
@@ -60,6 +60,22 @@ fn single_frames_and_colour_are_understood() {
     assert_eq!(all(&path), [AnyFrame::U8(Frame::new(2, 1, vec![76, 9]).unwrap())]);
     let refused = NpySource::open(&path, Colour::Error).unwrap_err().to_string();
     assert!(refused.contains("luminance") && refused.contains("stack.npy"), "{refused}");
+}
+
+/// Pictures (H, W, 3) are not taken for H frames of W x 3 px.
+#[test]
+fn one_colour_picture_is_a_picture_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for channels in [3, 4] {
+        let header = NpyHeader::new(ElementType::U8, &[2, 5, channels]);
+        let path = save(folder.path(), &header, &vec![7u8; 10 * channels]);
+        assert_eq!(all(&path), [AnyFrame::U8(Frame::filled(5, 2, 7))]);
+        let refused = NpySource::open(&path, Colour::Error).unwrap_err().to_string();
+        assert!(refused.contains("one colour picture") && refused.contains("--luminance"), "{refused}");
+    }
+    // Frames as small in both directions are no picture.
+    let path = save(folder.path(), &NpyHeader::new(ElementType::U8, &[9, 4, 3]), &[7u8; 108]);
+    assert_eq!(NpySource::open(&path, Colour::Error).unwrap().len_hint(), Some(9));
 }
 
 #[test]

@@ -174,6 +174,40 @@ def test_the_binary_says_what_can_be_done(name, advice, tmp_path):
             io.frames(tmp_path / name)
 
 
+@pytest.mark.parametrize("channels", [3, 4])
+def test_one_colour_picture_is_not_taken_for_frames(saved, tmp_path, channels):
+    picture = RNG.integers(0, 256, (12, 16, channels)).astype(np.uint8)
+    # As MATLAB has it: savers move the first axis to the end.
+    path = saved(picture=np.moveaxis(picture, -1, 0) if "mat" in saved(frames=STACK).suffix else picture)
+    np.save(tmp_path / "a.npy", picture)
+    for file in (path, tmp_path / "a.npy"):
+        assert_array_equal(list(io.frames(file, colour="rgb")), [picture[..., :3]])
+        assert_array_equal(list(io.frames(file, colour="luminance")), [jacoflow.luminance(picture)])
+        if file.suffix == ".mat":
+            assert_array_equal(list(io.frames(file)), np.moveaxis(picture, -1, 0))
+            continue
+        with pytest.raises(jacoflow.FormatError, match=rf"got shape \(12, 16, {channels}\): one colour picture, .*colour=\"luminance\""):
+            next(io.frames(file))
+
+
+def test_narrow_frames_in_matlab_are_frames(tmp_path):
+    narrow = STACK[:, :, :3]
+    save_old_matlab(tmp_path / "a.mat", {"frames": narrow})
+    assert_array_equal(list(io.frames(tmp_path / "a.mat", colour="luminance")), narrow)
+
+
+@pytest.mark.parametrize(("kind", "advice"), [("cell array", r"cat\(3, recording\{:\}\)"), ("sparse array", r"full\(recording\)")])
+def test_other_variables_of_matlab_are_named(tmp_path, kind, advice):
+    scipy_io = pytest.importorskip("scipy.io")
+    sparse = pytest.importorskip("scipy.sparse")
+    cells = np.empty(2, object)
+    cells[:] = list(STACK[:2])
+    values = {"cell array": cells, "sparse array": sparse.csc_matrix(np.eye(8))}
+    scipy_io.savemat(tmp_path / "a.mat", {"recording": values[kind]})
+    with pytest.raises(jacoflow.FormatError, match=rf"recording is a {kind}; expected an array of numbers. In MATLAB .*{advice}"):
+        io.frames(tmp_path / "a.mat")
+
+
 @pytest.mark.parametrize("key", [None, "recording"])
 def test_a_struct_of_matlab_says_what_to_do(tmp_path, key):
     scipy_io = pytest.importorskip("scipy.io")

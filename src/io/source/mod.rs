@@ -150,7 +150,7 @@ const SIGNATURE_BYTES: u64 = 10;
 /// |---|---|
 /// | `-` | Y4M on standard input |
 /// | `*.y4m` | Y4M file; its luma plane, where the others are grey or luminance is requested |
-/// | `*.npy` | stack `(T, H, W)` or one frame `(H, W)` of numbers; colour `(T, H, W, 3)` |
+/// | `*.npy` | stack `(T, H, W)` or one frame `(H, W)` of numbers; colour `(T, H, W, 3)` or `(H, W, 3)` |
 /// | `*.txt`, `*.lst` | list of image files, one a line |
 /// | a folder | its PNG, TIFF, BMP, PGM and JPEG files in natural order |
 /// | an image file | its picture, or the pages of a TIFF (along time, see [`PlaneSelection`]) |

@@ -26,8 +26,8 @@ const BATCH_BYTES: usize = 64 << 20;
 
 /// A numpy stack `(T, H, W)`, one frame `(H, W)` or colour `(T, H, W, C)` with C = 1, 3 or 4; uint8, uint16,
 /// float32 or float64, or a type that one of these holds exactly (bool as uint8, int8, int16 and float16 as
-/// float32, wider integers as float64), either byte order. Where colour frames are read `(H, W, 3)` and
-/// `(H, W, 4)` are one colour frame.
+/// float32, wider integers as float64), either byte order. `(H, W, 3)` and `(H, W, 4)` are one colour frame;
+/// where colour is refused such an array is refused as ambiguous, unless its W is at most 4.
 ///
 /// In C order each frame is read when it is needed. In Fortran order the samples of one frame are spread
 /// over the whole file, so each pass over the file gathers as many frames as fit 64 MiB (at least one).
@@ -66,7 +66,16 @@ impl<P: ChannelPolicy> NpySource<P> {
         }
         let (frames, height, width, channels) = match header.shape[..] {
             [h, w] => (1, h, w, 1),
-            [h, w, c @ (3 | 4)] if policy.colour_use() == ColourUse::Kept => (1, h, w, c),
+            [h, w, c @ (3 | 4)] if policy.colour_use() != ColourUse::Refused => (1, h, w, c),
+            [_, rows, columns @ (3 | 4)] if rows > 4 => {
+                let message = format!(
+                    "expected a stack (T, H, W), got shape {}: one colour picture, or frames {columns} px wide; for a \
+                     picture ask for luminance by --luminance or colour=\"luminance\" (or \"rgb\"), or \
+                     transpose a stack to (T, H, W)",
+                    header.shown()
+                );
+                return Err(Error::format(path, message));
+            }
             [t, h, w] => (t, h, w, 1),
             [t, h, w, c @ (1 | 3 | 4)] => (t, h, w, c),
             _ => {
