@@ -1,6 +1,7 @@
 //! The paths that a command reads and writes: no path may be both, and no two options may write one file.
 
 use crate::error::{Error, Result};
+use crate::io::write::{NewFolders, link_target};
 use crate::io::{NumberedFiles, files_read};
 use crate::pipeline::{is_device, is_folder};
 use std::collections::HashSet;
@@ -109,25 +110,7 @@ impl CommandPaths {
                 }
             }
         }
-        let places = self.written.iter().flat_map(|written| written.place.ancestors());
-        let mut new: Vec<PathBuf> = places.filter(|place| !place.exists()).map(Path::to_path_buf).collect();
-        new.sort_by_key(|path| std::cmp::Reverse(path.components().count()));
-        Ok(NewFolders(new))
-    }
-}
-
-/// Paths that did not exist before a command, the innermost first. Those that are empty folders at its end
-/// are removed, so that a refused command leaves none.
-#[must_use = "the folders are removed when this is dropped"]
-#[derive(Debug)]
-pub struct NewFolders(Vec<PathBuf>);
-
-impl Drop for NewFolders {
-    fn drop(&mut self) {
-        for path in &self.0 {
-            // Fails for files and for folders that hold something, which stay.
-            let _ = std::fs::remove_dir(path);
-        }
+        Ok(NewFolders::before(self.written.iter().map(|written| written.place.as_path())))
     }
 }
 
@@ -168,10 +151,11 @@ fn resolved(path: &Path) -> Option<PathBuf> {
     if path == Path::new("-") || is_device(path) {
         return None;
     }
-    if let Ok(whole) = path.canonicalize() {
-        return Some(whole);
+    let target = link_target(path);
+    if target.exists() {
+        return Some(target);
     }
-    let absolute = std::path::absolute(path).ok()?;
+    let absolute = std::path::absolute(target).ok()?;
     match (absolute.parent(), absolute.file_name()) {
         (Some(parent), Some(name)) => Some(resolved(parent)?.join(name)),
         _ => Some(absolute),

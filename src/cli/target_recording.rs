@@ -1,10 +1,8 @@
 //! Recordings of scenes of targets, for `jacoflow synth`: colour frames and the true boxes.
 
-use super::{
-    interrupt::Watch, paths::CommandPaths, paths::NewFolders, progress::Bar, report::Report, report::print_message,
-};
+use super::{interrupt::Watch, paths::CommandPaths, progress::Bar, report::Report, report::print_message};
 use crate::error::{Error, Result};
-use crate::io::{MotTable, check_sink, open_colour_sink};
+use crate::io::{MotTable, check_sink, open_colour_sink, write::NewFolders};
 use crate::parallel::{Progress, Threads};
 use crate::pipeline::{check_target, is_folder};
 use crate::synth::targets::{TargetScene, TargetSceneOptions};

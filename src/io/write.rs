@@ -110,11 +110,13 @@ impl AtomicFile {
     /// Opens a temporary file beside `path`.
     ///
     /// # Errors
-    /// [`Error::Io`] with `path` when its folder does not exist or may not be written, or `path` is a folder.
+    /// [`Error::Io`] with `path` when its folder does not exist or may not be written, or `path` is a folder
+    /// or a link in a loop of links.
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let target = path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
+        let target = link_target(path);
         let inner = match target.metadata() {
+            Err(error) if target.is_symlink() => return Err(Error::io(path, error)),
             Ok(meta) if meta.is_dir() => {
                 return Err(Error::io(path, io::Error::from(io::ErrorKind::IsADirectory)));
             }
@@ -181,6 +183,49 @@ impl Seek for Inner {
         match self {
             Self::Temporary(file) => file.file()?.seek(to),
             Self::Direct(file) => file.seek(to),
+        }
+    }
+}
+
+/// Longest chain of symbolic links, that of Linux.
+const MAX_LINKS: usize = 40;
+
+/// Where a path leads: symbolic links are followed, also to what does not exist yet. A link itself where they
+/// form a loop.
+pub(crate) fn link_target(path: &Path) -> PathBuf {
+    let mut target = path.to_path_buf();
+    for _ in 0..MAX_LINKS {
+        if let Ok(whole) = target.canonicalize() {
+            return whole;
+        }
+        let Ok(next) = target.read_link() else { break };
+        // Relative to the folder of the link.
+        target = target.parent().unwrap_or(Path::new("")).join(next);
+    }
+    target
+}
+
+/// Paths that did not exist before, the innermost first. On drop those that are empty folders are removed, so
+/// that a run that failed leaves none.
+#[must_use = "the folders are removed when this is dropped"]
+#[derive(Debug)]
+pub(crate) struct NewFolders(Vec<PathBuf>);
+
+impl NewFolders {
+    /// Those of `places`, and of the folders around them, that do not exist yet.
+    pub fn before<'a>(places: impl IntoIterator<Item = &'a Path>) -> Self {
+        let around = places.into_iter().flat_map(Path::ancestors);
+        let mut new: Vec<PathBuf> = around.filter(|place| !place.exists()).map(Path::to_path_buf).collect();
+        new.sort_by_key(|path| std::cmp::Reverse(path.components().count()));
+        Self(new)
+    }
+}
+
+impl Drop for NewFolders {
+    fn drop(&mut self) {
+        for path in &self.0 {
+            // Fails for files and for folders that hold something, which stay.
+            let _ = std::fs::remove_dir(path);
         }
     }
 }

@@ -62,6 +62,17 @@ fn links_and_modes_are_those_of_ordinary_files() {
     put(&link, b"new");
     assert!(link.symlink_metadata().unwrap().is_symlink());
     assert_eq!(fs::read(&real).unwrap(), b"new");
+    // A link to what is not there yet, relative and through another link.
+    fs::create_dir(folder.path().join("inner")).unwrap();
+    let (dangling, second) = (folder.path().join("dangling"), folder.path().join("inner/second"));
+    symlink("inner/second", &dangling).unwrap();
+    symlink("../later", &second).unwrap();
+    put(&dangling, b"new");
+    assert!(dangling.is_symlink() && second.is_symlink());
+    assert_eq!(fs::read(folder.path().join("later")).unwrap(), b"new");
+    let circle = folder.path().join("circle");
+    symlink("circle", &circle).unwrap();
+    assert!(matches!(AtomicFile::create(&circle), Err(Error::Io { .. })) && circle.is_symlink());
     fs::write(&plain, b"").unwrap();
     let mode = |p: &Path| p.metadata().unwrap().permissions().mode();
     assert_eq!(mode(&real), mode(&plain));

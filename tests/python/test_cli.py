@@ -1,6 +1,7 @@
 """The command line through Python: `python -m jacoflow` and the console script."""
 
 import json
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -97,3 +98,10 @@ def test_a_damaged_state_is_described_in_either_precision(tmp_path):
             assert result.returncode == 1 and words in result.stderr, result.stderr
             assert "expected a state in" not in result.stderr
             assert not (tmp_path / "out").exists()
+
+
+def test_a_closed_standard_output_is_an_error(tmp_path):
+    np.save(tmp_path / "frames.npy", np.zeros((3, 24, 32), np.uint8))
+    command = f"exec {shlex.quote(sys.executable)} -m jacoflow measure frames.npy --quantity u -q >&-"
+    result = run("-c", command, folder=tmp_path, command=("sh",))
+    assert result.returncode == 1 and "standard output: expected to be open" in result.stderr

@@ -232,6 +232,17 @@ def test_no_frames_make_no_file(name, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("name", ["a.npy", "a.y4m", "a", "a/b"])
+def test_frames_that_end_in_an_error_leave_nothing(name, frames, tmp_path):
+    def broken():
+        yield frames[0]
+        raise RuntimeError("no more")
+
+    with pytest.raises(RuntimeError, match="no more"):
+        io.write_frames(tmp_path / name, broken())
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.fixture
 def colour_frames():
     return np.random.default_rng(4).integers(0, 256, (4, 10, 12, 3)).astype(np.uint8)

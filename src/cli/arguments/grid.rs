@@ -75,22 +75,26 @@ fn read_points(path: &Path, into: &mut Vec<(usize, usize)>) -> Result<()> {
     let mut columns = (0, 1);
     let before = into.len();
     // Spreadsheets begin text with a byte order mark.
-    for (number, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
-        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-        if line.trim().is_empty() {
+    let text = text.trim_start_matches('\u{feff}').as_bytes();
+    let rows = csv::ReaderBuilder::new().has_headers(false).flexible(true).trim(csv::Trim::All).from_reader(text);
+    for row in rows.into_records() {
+        let cells = row.map_err(|error| Error::format(path, error.to_string()))?;
+        // Spaces alone: the reader passes over empty lines.
+        if cells.iter().eq([""]) {
             continue;
         }
         let point = || Some((cells.get(columns.0)?.parse().ok()?, cells.get(columns.1)?.parse().ok()?));
         match point() {
             Some(point) => into.push(point),
-            None if into.len() == before && !looks_like_a_point(line) => {
+            None if into.len() == before && cells.iter().any(|cell| cell.parse::<f64>().is_err()) => {
                 let place = |name: &str| cells.iter().position(|cell| cell.eq_ignore_ascii_case(name));
                 columns = place("x")
                     .zip(place("y"))
                     .ok_or_else(|| Error::format(path, "expected the columns x and y, or rows of two pixel numbers"))?;
             }
             None => {
-                let message = format!("line {}: expected whole pixels x,y of at least 0, got {line:?}", number + 1);
+                let (line, got) = (cells.position().map_or(0, csv::Position::line), cells.iter().collect::<Vec<_>>());
+                let message = format!("line {line}: expected whole pixels x,y of at least 0, got {:?}", got.join(","));
                 return Err(Error::format(path, message));
             }
         }
@@ -118,6 +122,9 @@ mod tests {
         };
         assert_eq!(arguments.sampling_grid().unwrap(), SamplingGrid::Points(vec![(7, 8), (1, 2), (3, 4)]));
         std::fs::write(&file, "\u{feff}x,y\r\n1,2\r\n3,4\r\n").unwrap();
+        assert_eq!(arguments.sampling_grid().unwrap(), SamplingGrid::Points(vec![(7, 8), (1, 2), (3, 4)]));
+        // As R writes tables.
+        std::fs::write(&file, "\"\",\"y\",\"x\"\n\"1\",2,1\n\"2\",\"4\",\"3\"\n").unwrap();
         assert_eq!(arguments.sampling_grid().unwrap(), SamplingGrid::Points(vec![(7, 8), (1, 2), (3, 4)]));
         std::fs::write(&file, "1,2\n3,-4\n").unwrap();
         assert!(arguments.sampling_grid().unwrap_err().to_string().contains("line 2"));

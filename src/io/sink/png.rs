@@ -2,7 +2,7 @@
 
 use super::{FrameSink, Kind, Uniform};
 use crate::error::{Error, Result};
-use crate::io::write::TemporaryFolder;
+use crate::io::write::{NewFolders, TemporaryFolder};
 use crate::io::{NumberedFiles, write_colour_png, write_frame_png};
 use crate::types::{AnyColourFrame, AnyFrame};
 use std::path::{Path, PathBuf};
@@ -19,19 +19,22 @@ pub(super) const KIND: Kind = Kind {
 pub struct PngSink {
     folder: PathBuf,
     waiting: TemporaryFolder,
+    /// Dropped after `waiting`, which lies inside.
+    _made: NewFolders,
     files: NumberedFiles,
     next: usize,
     uniform: Uniform,
 }
 
 impl PngSink {
-    /// Files in `folder`, which is made when it does not exist.
+    /// Files in `folder`, which is made when it does not exist, and removed again when none get there.
     pub fn create(folder: impl AsRef<Path>) -> Result<Self> {
         let folder = folder.as_ref();
+        let made = NewFolders::before([folder]);
         std::fs::create_dir_all(folder).map_err(|error| Error::io(folder, error))?;
         let waiting = TemporaryFolder::inside(folder)?;
         let files = numbered(waiting.path())?;
-        Ok(Self { folder: folder.to_path_buf(), waiting, files, next: 0, uniform: Uniform::default() })
+        Ok(Self { folder: folder.to_path_buf(), waiting, _made: made, files, next: 0, uniform: Uniform::default() })
     }
 
     fn place(self) -> Result<()> {
