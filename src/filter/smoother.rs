@@ -43,7 +43,7 @@ pub(super) fn smooth<M: Manifold>(
     mut step: impl FnMut(&mut M, (usize, &[f64]), &[f64], &[f64]) -> Result<Transition>,
 ) -> Result<Smoothed> {
     let (n, means) = (state.dim_x, state.batch * state.dim_x);
-    if Xs.is_empty() || !Xs.len().is_multiple_of(means) {
+    if !Xs.len().is_multiple_of(means) {
         let expected = format!("a multiple of {means} values");
         return Err(Error::argument("Xs", expected, format!("{} values", Xs.len())));
     }
@@ -59,7 +59,7 @@ pub(super) fn smooth<M: Manifold>(
     let square = n * n;
     let (mut noise, mut rest, mut weighted) = (vec![0.0; square], vec![0.0; square], vec![0.0; square]);
     let mut factor = vec![0.0; square];
-    for k in (0..times - 1).rev() {
+    for k in (0..times.saturating_sub(1)).rev() {
         checkpoint();
         let x = &Xs[k * means..(k + 1) * means];
         let mut P = Ps[k * size..(k + 1) * size].to_vec();

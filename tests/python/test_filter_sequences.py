@@ -463,3 +463,18 @@ def test_sizes_and_switches_are_named():
         KalmanFilter(2, 1).batch_filter([1.0], update_first=1)
     with pytest.raises(TypeError, match="^redraw: expected True or False, got int"):
         UnscentedKalmanFilter(2, 1, 1.0, None, None, points, redraw=1)
+
+
+@pytest.mark.parametrize("batch", [None, 3])
+def test_no_measurements_are_smoothed_to_none(batch):
+    points = MerweScaledSigmaPoints(2, 0.5, 2.0, 1.0)
+    linear, extended = KalmanFilter(2, 1, batch=batch), ExtendedKalmanFilter(2, 1, batch=batch)
+    unscented_one = UnscentedKalmanFilter(2, 1, 0.1, lambda x: x[..., :1], lambda x, dt: x, points, batch=batch)
+    lead = () if batch is None else (batch,)
+    for smooth in (linear.rts_smoother, unscented_one.rts_smoother, lambda *given: extended.rts_smoother(*given, lambda x: x)):
+        for given in (linear.batch_filter([])[:2], ([], [])):
+            smoothed, *matrices = smooth(*given)
+            assert smoothed.shape == (0, *lead, 2)
+            assert all(array.shape == (0, *lead, 2, 2) for array in matrices)
+    with pytest.raises(ValueError, match="^Ps: expected 0 arrays of shape"):
+        linear.rts_smoother([], np.zeros((1, *lead, 2, 2)))

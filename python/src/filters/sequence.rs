@@ -79,10 +79,10 @@ pub fn filtered(
             if value.hasattr("__next__")? { Some(PyList::new(value.py(), items(name, value)?)?) } else { None };
         let (shape, values) = arrays::doubles(name, listed.as_ref().map_or(value, |list| list.as_any()))?;
         let one = filter.shape(index);
+        // A list of no arrays says nothing of their shape.
+        let shape = if shape == [0] { [&shape[..], &one[..]].concat() } else { shape };
         match shape.split_first() {
-            Some((&count, tail)) if tail == one && count > 0 && times.is_none_or(|times| times == count) => {
-                Ok((count, values))
-            }
+            Some((&count, tail)) if tail == one && times.is_none_or(|times| times == count) => Ok((count, values)),
             _ => {
                 let times = times.map_or("T".to_owned(), |times| times.to_string());
                 let [one, got] = [&one, &shape].map(|axes| shape_text(axes));
