@@ -81,6 +81,18 @@ def converted(name: str, value: Any, convert: Callable[[Any], Any], expected: st
         raise TypeError(f"{name}: expected {expected}, got {shown(value)}") from None
 
 
+def word(name: str, value: Any, expected: str) -> str:
+    """A word, no unit; ValueError by name for another object. The compiled part knows which words there are."""
+    if not is_word(value):
+        raise ValueError(f"{name}: expected {expected}, got {value!r}")
+    return str(value)
+
+
+def is_word(value: Any) -> bool:
+    """Whether a value (no unit) is printable text: the compiled part takes no lone surrogates."""
+    return isinstance(value, str) and value.isprintable()
+
+
 def path_of(name: str, value: str | os.PathLike[str]) -> str:
     """A path as a string; TypeError by name for another object."""
     path = os.fspath(value) if isinstance(value, str | os.PathLike) else None

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ._checks import check_memory, numbers, real_number
+from ._checks import check_memory, is_word, numbers, real_number, word
 
 MOST_ID = 2**63 - 2
 """Greatest number of a target, no unit."""
@@ -38,8 +38,7 @@ def checked(options: Mapping[str, Any]) -> dict[str, Any]:
     """
     out = dict(options)
     for name, expected in WORDS.items():
-        if not isinstance(out[name], str):
-            raise ValueError(f"{name}: expected {expected}, got {out[name]!r}")
+        word(name, out[name], expected)
     for name in ("n_particles", "n_near"):
         out[name] = _integer(name, out[name], MOST_PARTICLES)
     out["random_state"] = _integer("random_state", out["random_state"], MOST["random_state"])
@@ -75,7 +74,7 @@ def _names(name: str, value: Any) -> list[str]:
     """Names of likelihoods or parts, no unit."""
     # An iterator is read once: reading it for the check alone would leave no names.
     names: list[Any] = [None] if isinstance(value, str) or not isinstance(value, Iterable) else list(value)
-    if not all(isinstance(each, str) for each in names):
+    if not all(is_word(each) for each in names):
         raise ValueError(f"{name}: expected a sequence of names, got {value!r}")
     return names
 

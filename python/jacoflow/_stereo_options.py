@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._checks import converted, real_number, switch
+from ._checks import converted, real_number, switch, word
 
 COUNTS = ("n_components", "random_state", "search", "threads")
 """Counts, no unit; None where the default depends on the mode."""
@@ -59,8 +59,7 @@ class StereoCamera:
 def checked(options: Mapping[str, Any]) -> dict[str, Any]:
     """The stereo tracker's options, each in the unit it had, as the compiled part takes them; what is of another kind, length or sign is refused by name."""
     out = dict(options)
-    if not isinstance(out["mode"], str):
-        raise ValueError(f'mode: expected "improved" or "paper", got {out["mode"]!r}')
+    word("mode", out["mode"], '"improved" or "paper"')
     if out["camera"] is not None and not isinstance(out["camera"], StereoCamera):
         raise TypeError(f"camera: expected a StereoCamera or None, got {out['camera']!r}")
     out["camera"] = None if out["camera"] is None else astuple(out["camera"])
@@ -101,8 +100,8 @@ def checked_matching(options: Mapping[str, Any]) -> dict[str, Any]:
             out[name] = _several(name, value, 2, whole=True)
         elif name in ("subpixel", "left_right_check"):
             out[name] = switch(name, value)
-        elif name == "method" and not isinstance(value, str):
-            raise ValueError(f'method: expected "classes" or "sgm", got {value!r}')
+        elif name == "method":
+            word(name, value, '"classes" or "sgm"')
     return out
 
 

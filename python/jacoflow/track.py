@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._brief import Brief, columns
-from ._checks import known_options, numbers, real_number
+from ._checks import known_options, numbers, real_number, word
 from ._jacoflow import _detect_moving_target, _GaussMarkovFilter, _GradientTracker
 from ._particle_track import ParticleCorners, ParticleStep, ParticleTracker
 from ._particle_tracks import ParticleTrack, ParticleTracks, track_particles
@@ -216,10 +216,8 @@ _SWITCHES = (bool, np.bool_)
 
 
 def _word(name: str, value: Any) -> str:
-    """A word; which ones there are the compiled part checks."""
-    if not isinstance(value, str):
-        raise ValueError(f"{name}: expected {_WORDS[name]}, got {value!r}")
-    return value
+    """One of the words of `_WORDS`."""
+    return word(name, value, _WORDS[name])
 
 
 def _whole(name: str, value: Any) -> int:

@@ -32,16 +32,20 @@ pub fn as_array<'py>(argument: &str, object: &Bound<'py, PyAny>) -> Outcome<Boun
         ))
         .into());
     }
-    native(object)
+    native(argument, object)
 }
 
 /// As [`as_array`], of masked arrays too, which stay masked.
-pub fn native<'py>(object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
+pub fn native<'py>(argument: &str, object: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyUntypedArray>> {
     let py = object.py();
     let array = if let Ok(array) = object.cast::<PyUntypedArray>() {
         array.clone()
     } else {
-        py.import("numpy")?.getattr("asarray")?.call1((object,))?.cast_into::<PyUntypedArray>()?
+        let ragged = |error: PyErr| {
+            let said = || format!("{argument}: expected rows of equal length, got {}", error.value(py));
+            if error.is_instance_of::<PyValueError>(py) { PyValueError::new_err(said()) } else { error }
+        };
+        py.import("numpy")?.getattr("asarray")?.call1((object,)).map_err(ragged)?.cast_into::<PyUntypedArray>()?
     };
     let kind = array.getattr("dtype")?;
     if !kind.getattr("isnative")?.extract::<bool>()? {
@@ -112,7 +116,7 @@ pub fn frame(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> O
 /// As [`frame`], of masked arrays too: their masked pixels are NaN, which no estimate uses.
 pub fn frame_with_gaps(argument: &str, object: &Bound<'_, PyAny>, colour: ColourRule) -> Outcome<AnyFrame> {
     refuse_non_array(argument, object)?;
-    converted(argument, native(object)?, colour)
+    converted(argument, native(argument, object)?, colour)
 }
 
 /// As [`frame_with_gaps`], with the type in which the samples were given: a mask turns integers into floats.
@@ -130,13 +134,17 @@ pub fn tracked_frame(
     levels: GreyLevels,
 ) -> Outcome<AnyFrame> {
     refuse_non_array(argument, object)?;
-    converted(argument, unmasked(object, levels)?, colour)
+    converted(argument, unmasked(argument, object, levels)?, colour)
 }
 
 /// The array with NaN for masked samples; uint8 and uint16 then become float32 with the white that `levels`
 /// take floats to have.
-pub fn unmasked<'py>(object: &Bound<'py, PyAny>, levels: GreyLevels) -> Outcome<Bound<'py, PyUntypedArray>> {
-    let array = native(object)?;
+pub fn unmasked<'py>(
+    argument: &str,
+    object: &Bound<'py, PyAny>,
+    levels: GreyLevels,
+) -> Outcome<Bound<'py, PyUntypedArray>> {
+    let array = native(argument, object)?;
     let white = match dtype_name(&array).as_str() {
         "uint8" => f32::from(u8::MAX),
         "uint16" => f32::from(u16::MAX),
@@ -254,13 +262,7 @@ pub fn integer_pairs(argument: &'static str, object: &Bound<'_, PyAny>) -> Outco
 
 /// `length` or any number of doubles out of anything numpy can read as numbers.
 pub fn doubles(argument: &'static str, object: &Bound<'_, PyAny>) -> Outcome<(Vec<usize>, Vec<f64>)> {
-    let ragged = |raised: Raised| {
-        let error = PyErr::from(raised);
-        let own = error.is_instance_of::<PyValueError>(object.py());
-        let said = || format!("{argument}: expected rows of equal length, got {}", error.value(object.py()));
-        if own { PyValueError::new_err(said()) } else { error }
-    };
-    let array = as_array(argument, object).map_err(ragged)?;
+    let array = as_array(argument, object)?;
     check_size(argument, &array)?;
     let kind: String = array.dtype().getattr("kind")?.extract()?;
     if !matches!(kind.as_str(), "f" | "i" | "u") {

@@ -20,7 +20,7 @@ pub fn colour_frame(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<AnyCol
 
 /// As [`colour_frame`], of masked arrays too, for trackers: see [`unmasked`].
 pub fn tracked_colour_frame(argument: &str, object: &Bound<'_, PyAny>, levels: GreyLevels) -> Outcome<AnyColourFrame> {
-    converted(argument, unmasked(object, levels)?)
+    converted(argument, unmasked(argument, object, levels)?)
 }
 
 fn converted(argument: &str, array: Bound<'_, PyUntypedArray>) -> Outcome<AnyColourFrame> {

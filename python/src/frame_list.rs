@@ -72,7 +72,7 @@ impl<'py> Frames<'py> {
             let list = PyList::new(object.py(), list)?;
             return Ok(Self::of(list.as_any().clone(), list.len(), colour));
         }
-        let array = native(object)?;
+        let array = native("frames", object)?;
         let shape = array.shape().to_vec();
         let wanted = match colour {
             ColourRule::Refuse => "a list of frames (H, W) or a stack (T, H, W)",
@@ -105,8 +105,12 @@ impl<'py> Frames<'py> {
 
     /// Frame `index`, and the type in which its samples were given.
     pub fn get(&self, index: usize) -> Outcome<(AnyFrame, &'static str)> {
-        let name = self.names.get(index).copied().unwrap_or("frames");
-        typed_frame(name, &self.object.get_item(index)?, self.colour)
+        typed_frame(self.name(index), &self.object.get_item(index)?, self.colour)
+    }
+
+    /// What frame `index` is called in messages.
+    pub fn name(&self, index: usize) -> &'static str {
+        self.names.get(index).copied().unwrap_or("frames")
     }
 }
 

@@ -60,7 +60,31 @@ arguments!(
     PathBuf: "a path (a string or os.PathLike)",
     Region: "four integers (x, y, width, height) of 64 bits",
     Py<PyAny>: "an object",
+    Function: "a function",
 );
+
+/// A function argument.
+#[derive(Debug)]
+pub struct Function(pub Py<PyAny>);
+
+impl<'py> FromPyObject<'_, 'py> for Function {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if object.is_callable() {
+            Ok(Self(object.to_owned().unbind()))
+        } else {
+            Err(PyTypeError::new_err(Self::EXPECTED))
+        }
+    }
+}
+
+impl Function {
+    /// Another reference to it.
+    pub fn clone_ref(&self, py: Python<'_>) -> Self {
+        Self(self.0.clone_ref(py))
+    }
+}
 
 impl Argument for Bound<'_, PyAny> {
     const EXPECTED: &'static str = Py::<PyAny>::EXPECTED;
@@ -111,7 +135,7 @@ pub mod named {
             }
         )*};
     }
-    arguments!(aggregate alpha augmented backward batch beta between blur_sigma carrier channel classes colour colour_cast count covariance diagnostics dim_x dim_z duration ends forward_backward fps frame_rate frames grey grid height index initial interval kappa left_right_check length_unit levels mask max_count max_steps method min_distance min_eigenvalue min_step n n_components n_near n_particles name neighbourhood_sigma noise options origin pairs path pixel_pitch points precision preprocess prior_radius profile quality random_state redraw rounding saturate scale scheme search sigma simd source start step stop subpixel t temporal threads threshold time time_scheme truncate update_first width window x y);
+    arguments!(FJacobian HJacobian Hx aggregate alpha augmented backward batch beta between blur_sigma carrier channel classes colour colour_cast count covariance diagnostics dim_x dim_z duration ends forward_backward fps frame_rate frames fx grey grid height hx index initial interval kappa left_right_check length_unit levels mask max_count max_steps method min_distance min_eigenvalue min_step n n_components n_near n_particles name neighbourhood_sigma noise options origin pairs path pixel_pitch points precision preprocess prior_radius profile quality random_state redraw rounding saturate scale scheme search sigma simd source start step stop subpixel t temporal threads threshold time time_scheme transition truncate update_first width window x y);
 }
 
 /// The argument `region`, any sequence (x, y, width, height), px.
@@ -138,10 +162,16 @@ impl<'py> FromPyObject<'_, 'py> for Region {
 /// An object that may be absent, as an argument takes it and a pickle keeps it.
 pub type Object = Option<Py<PyAny>>;
 
-/// A deep copy of an option, so that later changes by the user do not reach it.
-pub fn keep(py: Python<'_>, object: Object) -> Outcome<Object> {
-    let copy = |object: Py<PyAny>| Ok(py.import("copy")?.getattr("deepcopy")?.call1((object,))?.unbind());
-    object.map(copy).transpose()
+/// A deep copy of the option called `name`, so that later changes by the user do not reach it. What cannot be
+/// copied is no option and is refused by name.
+pub fn keep(py: Python<'_>, name: &str, object: Object) -> Outcome<Object> {
+    let Some(object) = object else { return Ok(None) };
+    let copy = py.import("copy")?.getattr("deepcopy")?.call1((&object,)).map_err(|error| {
+        let got = arrays::kind_of(object.bind(py));
+        let said = || format!("{name}: expected an object that can be copied, such as an array, got {got}");
+        if error.is_instance_of::<PyTypeError>(py) { PyTypeError::new_err(said()) } else { error }
+    })?;
+    Ok(Some(copy.unbind()))
 }
 
 /// A group of options: an object of `jacoflow._options`, or none, whose options are all absent.

@@ -94,7 +94,7 @@ fn coloured(object: &Bound<'_, PyAny>, takes_grey: bool, levels: GreyLevels) -> 
     fn grey<T: Copy>(frame: &Frame<T>) -> Frame<[T; 3]> {
         frame.map(|&value| [value; 3])
     }
-    if !(takes_grey && arrays::unmasked(object, levels)?.ndim() == 2) {
+    if !(takes_grey && arrays::unmasked("frame", object, levels)?.ndim() == 2) {
         return tracked_colour_frame("frame", object, levels);
     }
     Ok(match arrays::tracked_frame("frame", object, ColourRule::Refuse, levels)? {

@@ -48,6 +48,29 @@ def test_frames_that_cannot_be_used(frames, error, message, method):
         jacoflow.estimate(frames, method=method)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ((GOOD[0], GOOD[1].astype(np.uint16)), TypeError, "second: expected uint8 like the first frame, got uint16"),
+        ((GOOD[0], GOOD[1], GOOD[2, :7]), ValueError, "third: expected frames of one size"),
+        ((GOOD[0], GOOD[1, :0]), ValueError, "second: expected frames of one size"),
+        ((GOOD[0, :0], GOOD[1, :0]), ValueError, "second: expected at least 3 x 3 pixels, got 10 x 0"),
+        (([[1, 2], [3]], GOOD[1]), ValueError, "first: expected rows of equal length"),
+        ((GOOD[0], [[1, 2], [3]]), ValueError, "second: expected rows of equal length"),
+    ],
+)
+def test_single_frames_that_cannot_be_used_are_named(arguments, error, message):
+    with pytest.raises(error, match="^" + message):
+        jacoflow.flow(*arguments)
+
+
+@pytest.mark.parametrize("mask", [memoryview(b"ab"), np])
+@pytest.mark.parametrize("kind", [FlowFilter, FlowEstimator])
+def test_options_that_cannot_be_copied_are_named(kind, mask):
+    with pytest.raises(TypeError, match=f"^mask: expected an object that can be copied, such as an array, got {type(mask).__name__}"):
+        kind(mask=mask)
+
+
 def test_names_of_files_are_no_frames():
     with pytest.raises(TypeError, match=r"got the name of a file \(a.png\); open it with jacoflow.io.frames"):
         jacoflow.flow("a.png", "b.png")

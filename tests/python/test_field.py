@@ -275,5 +275,8 @@ def test_indexing_a_stack():
     assert [field.frame_index for field in stack] == [1, 2, 3]
     with pytest.raises(IndexError, match="index 3"):
         stack[3]
+    for index in (2**63, -(2**63) - 1):
+        with pytest.raises(IndexError, match=f"^index {index}: the stack has 3 fields"):
+            stack[index]
     with pytest.raises(TypeError, match="^index: expected an integer or a slice, got list"):
         stack[[0, 2]]

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from jacoflow import NumericalError
-from jacoflow.filters import ExtendedKalmanFilter, KalmanFilter, MerweScaledSigmaPoints, UnscentedKalmanFilter
+from jacoflow.filters import ExtendedKalmanFilter, KalmanFilter, MerweScaledSigmaPoints, ParticleFilter, UnscentedKalmanFilter
 
 TRANSITION = np.array([[1.0, 0.1], [0.0, 1.0]])
 
@@ -269,3 +269,23 @@ def test_filters_pickle_mid_stream(make):
     assert_array_equal(one.x, other.x)
     assert_array_equal(one.P, other.P)
     assert one.repairs == other.repairs
+
+
+FUNCTIONS = {
+    "ukf hx": (lambda: UnscentedKalmanFilter(2, 1, 0.1, 5, fx, MerweScaledSigmaPoints(2, 0.5, 2.0, 1.0)), "hx", "int"),
+    "ukf fx": (lambda: UnscentedKalmanFilter(2, 1, 0.1, hx, None, MerweScaledSigmaPoints(2, 0.5, 2.0, 1.0)), "fx", "NoneType"),
+    "ukf attribute": (lambda: setattr(unscented(), "hx", 5), "hx", "int"),
+    "ukf predict": (lambda: unscented().predict(fx=5), "fx", "int"),
+    "ukf update": (lambda: unscented().update(0.1, hx=5), "hx", "int"),
+    "ekf predict": (lambda: ExtendedKalmanFilter(2, 1).predict(None), "fx", "NoneType"),
+    "ekf transition's Jacobian": (lambda: ExtendedKalmanFilter(2, 1).predict(lambda x: x, np.eye(2)), "FJacobian", "ndarray"),
+    "ekf measurement": (lambda: ExtendedKalmanFilter(2, 1).update(0.1, None, 5), "Hx", "int"),
+    "ekf measurement's Jacobian": (lambda: ExtendedKalmanFilter(2, 1).update(0.1, 5, hx), "HJacobian", "int"),
+    "particles": (lambda: ParticleFilter(2, 10).predict(5), "transition", "int"),
+}
+
+
+@pytest.mark.parametrize(("call", "name", "got"), FUNCTIONS.values(), ids=FUNCTIONS)
+def test_what_is_no_function_is_named(call, name, got):
+    with pytest.raises(TypeError, match=f"^{name}: expected a function, got {got}"):
+        call()

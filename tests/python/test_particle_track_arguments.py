@@ -35,6 +35,8 @@ def test_boxes_that_cannot_be_followed_are_named(boxes, message):
     [
         ({"mode": "fast"}, 'mode: expected one of improved, paper, got "fast"'),
         ({"mode": None}, 'mode: expected "improved" or "paper", got None'),
+        ({"mode": "\ud800"}, r"mode: expected .*, got '\\ud800'"),
+        ({"likelihoods": ["\ud800"]}, r"likelihoods: expected a sequence of names, got \['\\ud800'\]"),
         ({"n_particles": 0}, "n_particles: expected at least 8 particles, got 0"),
         ({"n_near": -1}, "n_near: expected an integer from 0 to 100000000, got -1"),
         ({"n_particles": 10**30}, "n_particles: expected an integer from 0 to 100000000, got 1000"),

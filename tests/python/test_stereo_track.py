@@ -521,3 +521,8 @@ def test_a_step_that_failed_changes_nothing():
 def test_what_is_no_text_is_no_graph(text):
     with pytest.raises(TypeError, match="^json: expected a text"):
         TrackGraph.from_json(text)
+
+
+def test_words_that_are_no_text_are_named():
+    with pytest.raises(ValueError, match=r"^mode: expected .*, got '\\ud800'"):
+        StereoTracker(mode="\ud800")

@@ -137,6 +137,8 @@ FRAME = np.full((40, 50), 90, np.uint8)
         ({"center": (9, 9)}, "center"),
         ({"model": "rigid"}, "model"),
         ({"camera": "moving"}, "camera"),
+        ({"camera": "\ud800"}, r"^camera: expected .*, got '\\ud800'"),
+        ({"model": "\ud800"}, r"^model: expected .*, got '\\ud800'"),
     ],
 )
 def test_errors_name_the_argument(arguments, names):

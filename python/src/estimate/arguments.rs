@@ -36,9 +36,15 @@ const _: () = assert!(METHOD_CLASSES.len() == METHODS.len());
 impl Arguments {
     /// With copies of the arrays, safe from later changes.
     pub fn keep(mut self, py: Python<'_>) -> Outcome<Self> {
-        let [grid, mask, preprocess] = [&mut self.grid, &mut self.mask, &mut self.preprocess];
-        for object in [&mut self.method, &mut self.initial, &mut self.temporal, grid, mask, preprocess] {
-            *object = options::keep(py, object.take())?;
+        for (name, object) in [
+            ("method", &mut self.method),
+            ("initial", &mut self.initial),
+            ("temporal", &mut self.temporal),
+            ("grid", &mut self.grid),
+            ("mask", &mut self.mask),
+            ("preprocess", &mut self.preprocess),
+        ] {
+            *object = options::keep(py, name, object.take())?;
         }
         Ok(self)
     }

@@ -339,7 +339,9 @@ fn estimate_one(frames: &Bound<'_, PyList>, arguments: Arguments) -> Outcome<Flo
     }
     for index in 0..frames.count {
         let (frame, dtype) = frames.get(index)?;
-        if let Some(field) = interruptible(py, || stream.push_at(frame, dtype, None))? {
+        let name = frames.name(index);
+        let named = |error| renamed(error, "frames", name);
+        if let Some(field) = interruptible(py, || stream.push_at(frame, dtype, None).map_err(named))? {
             return Ok(FlowField::any(field));
         }
     }

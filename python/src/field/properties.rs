@@ -2,7 +2,7 @@
 
 use super::{FlowField, Slice, Store, each, state};
 use crate::errors::Outcome;
-use crate::{arrays, io, keywords::getters, options::named};
+use crate::{arrays, io, keywords::getters, options::Integer, options::named};
 use jacoflow::types::{SamplingGrid, Status};
 use pyo3::exceptions::{PyIndexError, PyTypeError};
 use pyo3::prelude::*;
@@ -198,12 +198,12 @@ impl FlowField {
             let said = || format!("index: expected an integer or a slice, got {}", arrays::kind_of(index));
             if error.is_instance_of::<PyTypeError>(index.py()) { PyTypeError::new_err(said()) } else { error }
         };
-        let index: isize = index.extract().map_err(wrong)?;
-        let place = if index < 0 { index + count as isize } else { index };
-        if place < 0 || place >= count as isize {
+        let index: Integer = index.extract().map_err(wrong)?;
+        let place = if index.0 < 0 { index.0 + count as i128 } else { index.0 };
+        let Some(place) = usize::try_from(place).ok().filter(|&place| place < count) else {
             return Err(PyIndexError::new_err(format!("index {index}: the stack has {count} fields")).into());
-        }
-        Ok(Self { store: self.store.clone(), start: self.start + place as usize, count: 1, stack: false })
+        };
+        Ok(Self { store: self.store.clone(), start: self.start + place, count: 1, stack: false })
     }
 
     fn __repr__(&self) -> String {

@@ -4,7 +4,7 @@ use super::callback::{Callbacks, entry, lead, lock};
 use super::gaussian::{GaussianFilter, sizes};
 use super::sequence::{Record, check_each, filtered, for_each_time, items, noises, smoothed};
 use crate::errors::Outcome;
-use crate::options::{Integer, named};
+use crate::options::{Function, Integer, named};
 use jacoflow::filter::ExtendedFilter as Core;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -27,7 +27,7 @@ pub struct ExtendedKalmanFilter {
 fn on_rows(
     callbacks: &Callbacks,
     name: &'static str,
-    function: &Py<PyAny>,
+    function: &Function,
     batch: Option<usize>,
     (n, width): (usize, usize),
     (points, out): (&[f64], &mut [f64]),
@@ -35,7 +35,7 @@ fn on_rows(
     let rows = points.len() / (batch.unwrap_or(1) * n);
     let shape = |width: usize| if rows == 1 { lead(batch, &[width]) } else { lead(batch, &[rows, width]) };
     callbacks.call(name, &[(&shape(n), points)], &shape(width), out, |py, inputs| {
-        Ok(function.bind(py).call1((&inputs[0],))?)
+        Ok(function.0.bind(py).call1((&inputs[0],))?)
     })
 }
 
@@ -63,7 +63,11 @@ impl ExtendedKalmanFilter {
     ///
     /// Exceptions of the functions leave x and P as they were.
     #[pyo3(signature = (fx, FJacobian=None))]
-    fn predict(slf: &Bound<'_, Self>, fx: Py<PyAny>, FJacobian: Option<Py<PyAny>>) -> Outcome<()> {
+    fn predict(
+        slf: &Bound<'_, Self>,
+        #[pyo3(from_py_with = named::fx)] fx: Function,
+        #[pyo3(from_py_with = named::FJacobian)] FJacobian: Option<Function>,
+    ) -> Outcome<()> {
         let (py, base) = (slf.py(), slf.as_super().get());
         let mut core = lock(&slf.get().core)?;
         base.give(py, &mut core.state, None, None)?;
@@ -76,7 +80,7 @@ impl ExtendedKalmanFilter {
                 Some(jacobian) => work.predict(step, |means, out| {
                     let (shape_in, shape_out) = (lead(batch, &[n]), lead(batch, &[n, n]));
                     callbacks.call("FJacobian", &[(&shape_in, means)], &shape_out, out, |py, inputs| {
-                        Ok(jacobian.bind(py).call1((&inputs[0],))?)
+                        Ok(jacobian.0.bind(py).call1((&inputs[0],))?)
                     })
                 }),
             }
@@ -95,8 +99,8 @@ impl ExtendedKalmanFilter {
     fn update(
         slf: &Bound<'_, Self>,
         z: &Bound<'_, PyAny>,
-        HJacobian: Option<Py<PyAny>>,
-        Hx: Py<PyAny>,
+        #[pyo3(from_py_with = named::HJacobian)] HJacobian: Option<Function>,
+        #[pyo3(from_py_with = named::Hx)] Hx: Function,
         R: Option<&Bound<'_, PyAny>>,
     ) -> Outcome<()> {
         let (py, base) = (slf.py(), slf.as_super().get());
@@ -113,7 +117,7 @@ impl ExtendedKalmanFilter {
                 Some(jacobian) => work.update_on(&mut manifold, &z, measure, |means, out| {
                     let (shape_in, shape_out) = (lead(batch, &[n]), lead(batch, &[m, n]));
                     callbacks.call("HJacobian", &[(&shape_in, means)], &shape_out, out, |py, inputs| {
-                        Ok(jacobian.bind(py).call1((&inputs[0],))?)
+                        Ok(jacobian.0.bind(py).call1((&inputs[0],))?)
                     })
                 }),
             }
@@ -132,17 +136,17 @@ impl ExtendedKalmanFilter {
     fn batch_filter<'py>(
         slf: &Bound<'py, Self>,
         zs: &Bound<'py, PyAny>,
-        fx: Py<PyAny>,
-        HJacobian: Option<Py<PyAny>>,
-        Hx: Py<PyAny>,
-        FJacobian: Option<Py<PyAny>>,
+        #[pyo3(from_py_with = named::fx)] fx: Function,
+        #[pyo3(from_py_with = named::HJacobian)] HJacobian: Option<Function>,
+        #[pyo3(from_py_with = named::Hx)] Hx: Function,
+        #[pyo3(from_py_with = named::FJacobian)] FJacobian: Option<Function>,
         Rs: Option<&Bound<'py, PyAny>>,
     ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, base, zs) = (slf.py(), slf.as_super().get(), items("zs", zs)?);
         let (Rs, mut record) = (for_each_time("Rs", Rs, zs.len())?, Record::default());
         check_each(&zs, |z| base.measurement_of("zs", z))?;
         check_each(Rs.iter().flatten(), |R| base.noise("Rs", 3, R))?;
-        let copy = |function: &Option<Py<PyAny>>| function.as_ref().map(|function| function.clone_ref(py));
+        let copy = |function: &Option<Function>| function.as_ref().map(|function| function.clone_ref(py));
         for (z, R) in zs.iter().zip(&Rs) {
             py.check_signals()?;
             Self::predict(slf, fx.clone_ref(py), copy(&FJacobian))?;
@@ -163,8 +167,8 @@ impl ExtendedKalmanFilter {
         slf: &Bound<'py, Self>,
         Xs: &Bound<'py, PyAny>,
         Ps: &Bound<'py, PyAny>,
-        fx: Py<PyAny>,
-        FJacobian: Option<Py<PyAny>>,
+        #[pyo3(from_py_with = named::fx)] fx: Function,
+        #[pyo3(from_py_with = named::FJacobian)] FJacobian: Option<Function>,
         Qs: Option<&Bound<'py, PyAny>>,
     ) -> Outcome<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, base) = (slf.py(), slf.as_super().get());
@@ -182,7 +186,7 @@ impl ExtendedKalmanFilter {
                 |_: usize, means: &[f64], out: &mut [f64]| {
                     let (shape_in, shape_out) = (lead(batch, &[n]), lead(batch, &[n, n]));
                     callbacks.call("FJacobian", &[(&shape_in, means)], &shape_out, out, |py, inputs| {
-                        Ok(jacobian.bind(py).call1((&inputs[0],))?)
+                        Ok(jacobian.0.bind(py).call1((&inputs[0],))?)
                     })
                 }
             });

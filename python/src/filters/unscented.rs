@@ -5,7 +5,7 @@ use super::gaussian::{GaussianFilter, sizes};
 use super::sequence::{Record, check_each, filtered, for_each_time, items, noises, smoothed};
 use super::sigma_points::MerweScaledSigmaPoints;
 use crate::errors::Outcome;
-use crate::options::{Integer, named};
+use crate::options::{Function, Integer, named};
 use crate::{arrays, keywords::getters};
 use jacoflow::error::{Error, shape_text};
 use jacoflow::filter::UnscentedFilter as Core;
@@ -75,8 +75,8 @@ impl UnscentedKalmanFilter {
         #[pyo3(from_py_with = named::dim_x)] dim_x: Integer,
         #[pyo3(from_py_with = named::dim_z)] dim_z: Integer,
         dt: &Bound<'_, PyAny>,
-        hx: Py<PyAny>,
-        fx: Py<PyAny>,
+        #[pyo3(from_py_with = named::hx)] hx: Function,
+        #[pyo3(from_py_with = named::fx)] fx: Function,
         #[pyo3(from_py_with = named::points)] points: MerweScaledSigmaPoints,
         x_mean: Option<Py<PyAny>>,
         z_mean: Option<Py<PyAny>>,
@@ -99,8 +99,8 @@ impl UnscentedKalmanFilter {
         let base = GaussianFilter::new(py, &core.state, batch, functions)?;
         Ok(PyClassInitializer::from(base).add_subclass(Self {
             core: Mutex::new(core),
-            fx: Mutex::new(fx),
-            hx: Mutex::new(hx),
+            fx: Mutex::new(fx.0),
+            hx: Mutex::new(hx.0),
             points,
             dt,
             augmented,
@@ -113,8 +113,8 @@ impl UnscentedKalmanFilter {
         read(py, &self.fx)
     }
     #[setter]
-    fn set_fx(&self, value: Py<PyAny>) {
-        write(&self.fx, value);
+    fn set_fx(&self, #[pyo3(from_py_with = named::fx)] value: Function) {
+        write(&self.fx, value.0);
     }
     /// Measurement function points (..., n) -> (..., m), from state to measurement units.
     #[getter]
@@ -122,8 +122,8 @@ impl UnscentedKalmanFilter {
         read(py, &self.hx)
     }
     #[setter]
-    fn set_hx(&self, value: Py<PyAny>) {
-        write(&self.hx, value);
+    fn set_hx(&self, #[pyo3(from_py_with = named::hx)] value: Function) {
+        write(&self.hx, value.0);
     }
 
     /// Weighted mean `x_mean(points, weights)` of states, arrays (2 n + 1, n) or (B, 2 n + 1, n) and (2 n
@@ -156,14 +156,14 @@ impl UnscentedKalmanFilter {
     fn predict(
         slf: &Bound<'_, Self>,
         dt: Option<&Bound<'_, PyAny>>,
-        fx: Option<Py<PyAny>>,
+        #[pyo3(from_py_with = named::fx)] fx: Option<Function>,
         fx_args: Option<Py<PyDict>>,
     ) -> Outcome<()> {
         let (py, base, this) = (slf.py(), slf.as_super().get(), slf.get());
         let mut core = lock(&this.core)?;
         base.give(py, &mut core.state, None, None)?;
         let dt = dt.map_or(Ok(this.dt), |dt| step("dt", dt))?;
-        let (fx, batch, n) = (fx.unwrap_or_else(|| this.fx(py)), base.batch, base.dim_x);
+        let (fx, batch, n) = (fx.map_or_else(|| this.fx(py), |fx| fx.0), base.batch, base.dim_x);
         let callbacks = Callbacks::default();
         let (work, augmented, size) = (&mut *core, this.augmented, batch.unwrap_or(1));
         let mut manifold = base.manifold(py, &callbacks);
@@ -200,14 +200,14 @@ impl UnscentedKalmanFilter {
         slf: &Bound<'_, Self>,
         z: &Bound<'_, PyAny>,
         R: Option<&Bound<'_, PyAny>>,
-        hx: Option<Py<PyAny>>,
+        #[pyo3(from_py_with = named::hx)] hx: Option<Function>,
         hx_args: Option<Py<PyDict>>,
     ) -> Outcome<()> {
         let (py, base, this) = (slf.py(), slf.as_super().get(), slf.get());
         let z = base.measurement(z)?;
         let mut core = lock(&this.core)?;
         base.give(py, &mut core.state, None, R)?;
-        let (hx, batch, n, m) = (hx.unwrap_or_else(|| this.hx(py)), base.batch, base.dim_x, base.dim_z);
+        let (hx, batch, n, m) = (hx.map_or_else(|| this.hx(py), |hx| hx.0), base.batch, base.dim_x, base.dim_z);
         let callbacks = Callbacks::default();
         let (work, size) = (&mut *core, batch.unwrap_or(1));
         let mut manifold = base.manifold(py, &callbacks);

@@ -34,8 +34,13 @@ fn twelve(group: &Group<'_>, name: &'static str, default: [f64; 12]) -> Outcome<
 impl Arguments {
     /// With copies of the arrays, safe from later changes.
     pub fn keep(mut self, py: Python<'_>) -> Outcome<Self> {
-        for object in [&mut self.profile, &mut self.grid, &mut self.mask, &mut self.preprocess] {
-            *object = options::keep(py, object.take())?;
+        for (name, object) in [
+            ("profile", &mut self.profile),
+            ("grid", &mut self.grid),
+            ("mask", &mut self.mask),
+            ("preprocess", &mut self.preprocess),
+        ] {
+            *object = options::keep(py, name, object.take())?;
         }
         Ok(self)
     }

@@ -5,7 +5,7 @@ use crate::arrays;
 use crate::errors::Outcome;
 use crate::filters::callback::{Callbacks, lead, lock};
 use crate::image::renamed;
-use crate::options::{Integer, count, named};
+use crate::options::{Function, Integer, count, named};
 use jacoflow::error::{Error, shape_text};
 use jacoflow::filter::particle::{ParticleFilter as Core, Resampling};
 use pyo3::prelude::*;
@@ -51,7 +51,7 @@ impl ParticleFilter {
     fn predict(
         &self,
         py: Python<'_>,
-        transition: Option<Py<PyAny>>,
+        #[pyo3(from_py_with = named::transition)] transition: Option<Function>,
         F: Option<&Bound<'_, PyAny>>,
         Q: Option<&Bound<'_, PyAny>>,
     ) -> Outcome<()> {
@@ -71,7 +71,7 @@ impl ParticleFilter {
             if let Some(function) = &transition {
                 let step = |x: &[f64], next: &mut [f64]| {
                     callbacks.call("transition", &[(&shape, x)], &shape, next, |py, inputs| {
-                        Ok(function.bind(py).call1((&inputs[0],))?)
+                        Ok(function.0.bind(py).call1((&inputs[0],))?)
                     })
                 };
                 return work.predict(step, q.as_deref());
