@@ -129,6 +129,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("gradient.minimum_contrast", "a target fainter than the noise is not measured"),
     ("gradient.nearby_motion", "the motion of the scene around the target where it differs"),
     ("gradient.occlusion", "a target that something known covers is aligned by the rest"),
+    ("gradient.opposite", "what frames leave open of the support is as at the opposite point"),
     ("gradient.oriented_box", "the box that hides the scene turns with the target"),
     ("gradient.outline_variance", "the covariance holds the error of the learned outline"),
     ("gradient.recall", "a target that vanishes goes on from its last good state"),

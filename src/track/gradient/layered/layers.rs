@@ -82,12 +82,29 @@ impl Target {
         [(self.a.width() / 2) as f64, (self.a.height() / 2) as f64]
     }
 
-    /// Centroid of the support, target coordinates.
+    /// Centroid of the support as learnt so far, target coordinates.
     pub fn centroid(&self) -> [f64; 2] {
+        self.centroid_of(|at| self.a.data()[at])
+    }
+
+    /// Centroid of the support that the target is expected to have, target coordinates. As much of it at a
+    /// point as the prior still decides is taken from the opposite point: behind a moving target the
+    /// background is seen last, and the background that the box holds counts as target there until then.
+    pub fn expected_centroid(&self) -> [f64; 2] {
+        let (support, prior, weight) = (self.a.data(), self.prior.data(), self.d.data());
+        self.centroid_of(|at| {
+            let opposite = support[support.len() - 1 - at];
+            (support[at] + PRIOR / weight[at] * (opposite - prior[at])).clamp(0.0, 1.0)
+        })
+    }
+
+    #[inline(always)]
+    fn centroid_of(&self, support: impl Fn(usize) -> f64) -> [f64; 2] {
         let mut sums = [0.0; 3];
-        for j in 0..self.a.height() {
-            for (i, a) in self.a.row(j).iter().enumerate() {
-                let xi = self.xi(i, j);
+        let (width, height) = self.a.size();
+        for j in 0..height {
+            for i in 0..width {
+                let (a, xi) = (support(j * width + i), self.xi(i, j));
                 sums[0] += a;
                 sums[1] += a * xi[0];
                 sums[2] += a * xi[1];
@@ -217,6 +234,25 @@ pub(super) fn holds(bounds: &TargetBox, x: usize, y: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_point_that_is_not_determined_is_like_the_opposite_one() {
+        let frame = Frame::filled(60, 50, 90.0);
+        let mut target = Target::new(&frame, TargetBox::about([30.0, 20.0], 13.0, 9.0), PRIOR);
+        let (width, height) = target.a.size();
+        // The last three columns of the box turn out to be background; the first three were not seen yet.
+        for (i, j) in (0..height).flat_map(|j| (0..width).map(move |i| (i, j))) {
+            let at = j * width + i;
+            if target.xi(i, j)[0] > 3.5 {
+                (target.a.data_mut()[at], target.d.data_mut()[at]) = (0.0, 1e9);
+            }
+        }
+        assert!((target.centroid()[0] + 1.5).abs() < 1e-9);
+        assert!(target.expected_centroid()[0].abs() < 1e-4);
+        // Once those are determined as well, they count as they are.
+        target.d = target.d.map(|_| 1e9);
+        assert!((target.expected_centroid()[0] + 1.5).abs() < 1e-4);
+    }
 
     #[test]
     fn the_support_begins_as_the_box_with_its_area() {

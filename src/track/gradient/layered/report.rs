@@ -1,7 +1,7 @@
 //! What the tracker reports of the target.
 
 use super::{finding::Finding, state::State};
-use crate::types::{TrackState, TrackStatus};
+use crate::types::{TargetBox, TrackState, TrackStatus};
 
 /// Frames without a measurement after which the target is lost.
 const MAX_MISSED_FRAMES: usize = 15;
@@ -15,7 +15,7 @@ pub(super) fn report(tracker: &State, state: &mut TrackState, found: Option<&Fin
     };
     (state.status, state.reason) = (status, reason.into());
     state.camera_motion = motion;
-    let measured = tracker.position(&tracker.motion.pose);
+    let measured = sum(tracker.position(&tracker.motion.pose), tracker.undetermined());
     let before = state.bounds.centre();
     state.displacement = if found.is_some() { [0, 1].map(|k| measured[k] - before[k]) } else { [f64::NAN; 2] };
     report_motion(tracker, state);
@@ -33,10 +33,17 @@ pub(super) fn report_motion(tracker: &State, state: &mut TrackState) {
     } else {
         ([0, 1].map(|k| speed[k] + motion[k]), speed)
     };
-    state.position = tracker.motion.filter.position();
+    // The filter follows the support as learnt.
+    let undetermined = tracker.undetermined();
+    state.position = sum(tracker.motion.filter.position(), undetermined);
     state.acceleration = tracker.motion.filter.acceleration();
     state.covariance = tracker.covariance();
-    state.bounds = tracker.bounds(&tracker.motion.pose);
+    let bounds = tracker.bounds(&tracker.motion.pose);
+    state.bounds = TargetBox { x: bounds.x + undetermined[0], y: bounds.y + undetermined[1], ..bounds };
+}
+
+fn sum(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0] + b[0], a[1] + b[1]]
 }
 
 /// A target that has left the picture waits at its border.

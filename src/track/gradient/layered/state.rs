@@ -221,6 +221,16 @@ impl State {
         self.history.age < self.history.adapts_until && crate::ablation::keeps("gradient.adapting")
     }
 
+    /// From the centroid of the support as learnt to that of the support that the target is expected to
+    /// have, px.
+    pub fn undetermined(&self) -> [f64; 2] {
+        if !crate::ablation::keeps("gradient.opposite") {
+            return [0.0; 2];
+        }
+        let (learnt, expected) = (self.target.centroid(), self.target.expected_centroid());
+        self.motion.pose.turn([0, 1].map(|k| expected[k] - learnt[k]))
+    }
+
     /// Covariance of position, velocity and acceleration along x and y: the filter's, and how well the
     /// target's middle is known at all.
     pub fn covariance(&self) -> [[[f64; 3]; 3]; 2] {
@@ -230,9 +240,10 @@ impl State {
         } else {
             0.0
         };
+        let undetermined = self.undetermined();
         for (k, axis) in covariance.iter_mut().enumerate() {
-            axis[0][0] +=
-                outline * outline + self.uncertainty.displacement[k].powi(2) + self.uncertainty.outline[k].powi(2);
+            let own = [undetermined[k], self.uncertainty.displacement[k], self.uncertainty.outline[k]];
+            axis[0][0] += outline * outline + own.iter().map(|deviation| deviation * deviation).sum::<f64>();
         }
         covariance
     }
