@@ -277,8 +277,8 @@ class FlowField:
 
         `region` None for every site, a rectangle (x, y, width, height), a disc (x, y, radius), a polygon of
         corners (N, 2), px, or a boolean mask (H, W); `aggregate` "inverse_variance" (default) weighs by the
-        covariance, "median" does without. The mean motion stands at the
-        centre of the sites; derived quantities are its own: ratios, lengths and angles are
+        covariance, "median" does without. The mean motion stands at the centre of the sites (without slopes,
+        that of an affine fit to the flow); derived quantities are its own: ratios, lengths and angles are
         formed after the mean is, and what noise adds to a length is taken off. The standard deviation allows
         for the correlation of neighbouring estimates, and for an error that they have in common: what they
         claim and do not scatter. A single field only; `measure` fits one motion instead, and takes stacks.

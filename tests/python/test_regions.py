@@ -208,6 +208,19 @@ def test_a_mean_stands_at_the_centre_of_its_region(region):
     assert_allclose(field.region_mean("centre_distance", region)[0], distance, atol=0.3)
 
 
+def test_a_mean_without_slopes_stands_at_the_centre_of_its_region():
+    """A weighted mean of the flow alone is the flow where the weights are large."""
+    x, y = np.meshgrid(np.arange(100), np.arange(60))
+    flow = np.stack([0.01 * (x - 49.5) + 1.0, 0.005 * (y - 29.5)], axis=-1)
+    covariance = np.where(x < 50, 1e-6, 1.0)[..., np.newaxis, np.newaxis] * np.eye(2)
+    field = jacoflow.FlowField.from_arrays(flow, covariance)
+    value, std, count = field.region_mean("u")
+    assert count == 6000
+    assert_allclose(value, 1.0, atol=1e-6)
+    assert std < 0.01
+    assert_allclose(field.region_mean("u", (50, 0, 50, 60))[0], 1.25, atol=1e-6)
+
+
 @pytest.mark.parametrize("difference", [0.15, 0.2, 0.25, 0.3])
 @pytest.mark.parametrize("axis", [0, 1])
 def test_motions_that_are_not_separated_are_not_sure(difference, axis):

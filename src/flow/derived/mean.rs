@@ -1,6 +1,7 @@
 //! The mean motion of a region, and what is formed of it.
 
 use super::region::{carry_to, check, sites_in, valid_sites};
+use super::region_motion::{least_squares, observed_parameters};
 use super::sharing::{in_common, sharing_among};
 use super::{Motion, Quantity, unbiased_value_and_std};
 use crate::error::{Error, Result};
@@ -43,8 +44,8 @@ impl Mean {
 /// their centre, so that ratios, lengths and angles are formed after the mean is.
 ///
 /// Sites are weighted by the inverse variance of what the quantity is a linear combination of, or of what it
-/// is formed of. What noise adds to the length of a vector is taken off. NaN where the frames contradict more
-/// than half of the region's estimates.
+/// is formed of; to those of a field without slopes an affine motion is fitted. What noise adds to the length
+/// of a vector is taken off. NaN where the frames contradict more than half of the region's estimates.
 ///
 /// # Errors
 /// As [`plane`](super::plane()); [`Error::Argument`] naming `region` for one that does not fit the frame, and
@@ -108,7 +109,7 @@ fn mean_motion<'a, T: Real>(
     let Some(mut used) = region_sites(field, region, aggregate)? else { return Ok(None) };
     used.retain(|&index| field.affine(index).to_array().iter().all(|value| value.finite()));
     Ok(match aggregate {
-        Aggregate::InverseVariance => weighted(field, &used, combinations),
+        Aggregate::InverseVariance => fitted(field, &used).or_else(|| weighted(field, &used, combinations)),
         Aggregate::Median => median(field, &used),
     })
 }
@@ -155,6 +156,23 @@ fn of_mean(scatter: f64, (count, values): (usize, usize), sharing: f64) -> f64 {
 /// `a^T C a`.
 fn along(a: &[f64; 6], c: &[[f64; 6]; 6]) -> f64 {
     (0..6).map(|i| a[i] * (0..6).map(|j| c[i][j] * a[j]).sum::<f64>()).sum()
+}
+
+/// The mean motion of sites without slopes: a mean with unequal weights would be that of another place than
+/// their centre. The affine fit to their flow is carried there.
+fn fitted<'a, T: Real>(field: &'a FlowField<T>, used: &[usize]) -> Option<(Motion<'a>, usize)> {
+    let flow = observed_parameters(field);
+    let places = || used.iter().map(|&site| field.layout.sites.pixel(site % field.width, site / field.width));
+    let sum = places().fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x as f64, sum.1 + y as f64));
+    let centre = (sum.0 / used.len() as f64, sum.1 / used.len() as f64);
+    let (parameters, covariance) =
+        if flow == [0, 1] { least_squares(field, used, centre, &flow)? } else { return None };
+    let (dx, dy) = field.layout.units.pixel_pitch;
+    let at = (centre.0 * dx, centre.1 * dy);
+    Some((
+        Motion { parameters, covariance: Some(covariance), at, ..Motion::at_site(field, *used.first()?) },
+        used.len(),
+    ))
 }
 
 fn weighted<'a, T: Real>(

@@ -162,8 +162,8 @@ pub fn fit_region<T: Real>(
     Ok(RegionMotion { motion, covariance, count, status: RegionStatus::Ok, ..unknown })
 }
 
-/// The weighted fit to the parameters `observed` of the sites `used`, with its covariance.
-fn least_squares<T: Real>(
+/// The weighted fit to the parameters `observed` of the sites `used` about `centre`, px, with its covariance.
+pub(super) fn least_squares<T: Real>(
     field: &FlowField<T>,
     used: &[usize],
     centre: (f64, f64),
@@ -211,7 +211,7 @@ fn floors<T>(field: &FlowField<T>) -> [f64; 6] {
 }
 
 /// Which of the six parameters the model estimates.
-fn observed_parameters<T: Real>(field: &FlowField<T>) -> Vec<usize> {
+pub(super) fn observed_parameters<T: Real>(field: &FlowField<T>) -> Vec<usize> {
     let known = |name: &str| field.layout.parameters.iter().any(|parameter| parameter == name);
     (0..6).filter(|&k| known(MOTION_NAMES[k])).collect()
 }
