@@ -455,14 +455,14 @@ def test_items_of_a_sequence_are_refused_by_its_name_before_the_first_step(name)
 
 def test_sizes_and_switches_are_named():
     points = MerweScaledSigmaPoints(2)
-    for make in (KalmanFilter, ExtendedKalmanFilter, lambda *sizes, **rest: UnscentedKalmanFilter(*sizes, 1.0, None, None, points, **rest)):
+    for make in (KalmanFilter, ExtendedKalmanFilter, lambda *sizes, **rest: UnscentedKalmanFilter(*sizes, 1.0, np.copy, np.copy, points, **rest)):
         for arguments, rest, name in (((2.5, 1), {}, "dim_x"), ((2, "1"), {}, "dim_z"), ((2, 1), {"batch": 1.5}, "batch")):
             with pytest.raises(TypeError, match=f"^{name}: expected an integer, got (float|str)"):
                 make(*arguments, **rest)
     with pytest.raises(TypeError, match="^update_first: expected True or False, got int"):
         KalmanFilter(2, 1).batch_filter([1.0], update_first=1)
     with pytest.raises(TypeError, match="^redraw: expected True or False, got int"):
-        UnscentedKalmanFilter(2, 1, 1.0, None, None, points, redraw=1)
+        UnscentedKalmanFilter(2, 1, 1.0, np.copy, np.copy, points, redraw=1)
 
 
 @pytest.mark.parametrize("batch", [None, 3])
