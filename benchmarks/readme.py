@@ -67,6 +67,7 @@ LIMITS = "Limits of a step"
 WAVES = "Turning waves"
 TWO_MOTIONS = "Two motions in a region"
 NOISE = "Noise of a pair"
+METHODS = "Turning by method"
 DISCS = "Turning discs"
 HARD = "Tracking, 28 hard scenes, share of frames found / median error of the centre in px"
 SCENES = "Particle tracker, ten scenes"
@@ -153,6 +154,14 @@ def noise(record: Record) -> list[str]:
     names = ("error of u", "std of u", "error of divergence", "std of divergence")
     body = [[number(row["noise, grey levels"], 0), *(number(row.get(name), 3) for name in names)] for row in record.sections[NOISE]]
     return lines(["noise, grey levels", *names], body)
+
+
+def other_methods(record: Record) -> list[str]:
+    """What `measure` says of turning texture, by the method of the field."""
+    names = ("value", "scatter", "std")
+    rows = record.sections[METHODS]
+    body = [[str(row["method"]), str(row["measured"]), *(number(row.get(name), 3) for name in names)] for row in rows]
+    return lines(["method", "measured", "over the truth", "scatter", "std"], body)
 
 
 def _both(row: dict[str, object], first: str, digits: int, second: str, more: int) -> str:
@@ -311,6 +320,7 @@ TABLES: dict[str, tuple[Callable[[Record], list[str]], tuple[str, ...]]] = {
     "two_motions": (two_motions, (TWO_MOTIONS,)),
     "turning_discs": (turning_discs, (DISCS,)),
     "noise": (noise, (NOISE,)),
+    "other_methods": (other_methods, (METHODS,)),
     "parts": (parts, (FILTER, "Weighted mixtures, a round")),
 }
 """Table of a document -> its maker, and sections of the results that it needs."""

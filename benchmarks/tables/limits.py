@@ -24,6 +24,10 @@ SQUARE = (40, 40, 81, 81)
 """The region that is measured."""
 MARGIN = 24
 """Pixels at the edges that are left out."""
+METHODS = {"coarse_to_fine": "curl", "windowed": "curl", "flow filter": "curl", "lucas_kanade": "u"}
+"""Method -> what is measured of its field; the last has no slopes."""
+TRUTH, FILTERED, INNER = {"curl": 0.02, "u": 0.2}, 40, (13, 10, 70, 52)
+"""Curl, rad/frame, and u in the middle, px/frame; frames that the filter gets; and the region."""
 
 
 def cases() -> dict[str, tuple[NDArray[np.float64], tuple[float, float]]]:
@@ -158,6 +162,31 @@ def noise(seeds: tuple[int, ...]) -> list[Row]:
     return rows
 
 
+def other_methods(seeds: tuple[int, ...]) -> list[Row]:
+    """What `measure` says of a region of fine texture that turns, by the method of the field: value, its standard
+    deviation and that of the values, as shares of the truth."""
+    rows: list[Row] = []
+    for method, name in METHODS.items():
+        found = []
+        for seed in range(4 * len(seeds)):
+            rng = np.random.default_rng(seed)
+            scene = jacoflow.scenes.Scene(
+                "affine", width=96, height=72, random_state=seed, carrier="speckle",
+                u=TRUTH["u"], v=0.0, u_x=0.0, v_x=0.5 * TRUTH["curl"], u_y=-0.5 * TRUTH["curl"], v_y=0.0,
+            )
+            frames = [eight_bit(scene.frame(float(k)), 1.0, rng) for k in range(FILTERED if method == "flow filter" else 3)]
+            if method == "flow filter":
+                stream = jacoflow.FlowFilter(profile="measured", grid=jacoflow.SamplingGrid(stride=3))
+                field = [stream.push(frame) for frame in frames][-1]
+            else:
+                field = jacoflow.flow(*frames, method=method)
+            measured = field.measure(name, INNER)
+            found.append((measured.value / TRUTH[name], measured.std / TRUTH[name]))
+        values, stds = zip(*found, strict=True)
+        rows.append({"method": method, "measured": name, "value": float(np.mean(values)), "std": float(np.mean(stds)), "scatter": float(np.std(values))})
+    return rows
+
+
 def _rms(values: list[float]) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
@@ -168,6 +197,7 @@ TABLES = {
     "two_motions": report.Table("Two motions in a region", lambda o: two_motions(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "turning_discs": report.Table("Turning discs", lambda o: turning_discs(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "noise": report.Table("Noise of a pair", lambda o: noise(SEEDS[: 1 if o.quick else len(SEEDS)])),
+    "other_methods": report.Table("Turning by method", lambda o: other_methods(SEEDS[: 1 if o.quick else len(SEEDS)])),
 }
 
 if __name__ == "__main__":
