@@ -1,5 +1,6 @@
 """The gradient tracker on scenes with exact truth and, with JACOFLOW_DATA, on recordings: share of frames
-found, time."""
+found, time; of discs whose boxes hold background the greatest errors of the position, px, and over their standard
+deviations."""
 
 from __future__ import annotations
 
@@ -10,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+import jacoflow
 from benchmarks.rivals.trackers import ours
 from benchmarks.scenes import tracking as scenes
 from benchmarks.scenes import tracking_begin, tracking_hard, tracking_recordings
-from benchmarks.scenes.tracking import TIMES, Plane, Scene, Truth, figure, line, square
+from benchmarks.scenes.tracking import TIMES, Plane, Scene, Truth, disc, figure, line, square
 from benchmarks.scores.tracking import scores
 
 LARGER_IS_BETTER = (
@@ -24,6 +26,8 @@ SEED = 4000
 """Added to the seeds of the backgrounds; no table uses these."""
 BACKGROUND = 64
 """Seed of backgrounds that belong to this table alone."""
+DISC_KINDS, DISC_RADIUS = ("smooth:4,110,25", "fractal:1,90,30"), 14.0
+"""Backgrounds and radius, px, of discs that are alone in their box."""
 
 
 def unseen(scene: Scene) -> Scene:
@@ -80,6 +84,15 @@ def tested() -> Iterator[tuple[str, Scene]]:
             yield "jumps", scene
 
 
+def of_disc(kind: str, speed: float) -> tuple[float, float]:
+    """Greatest error of the position of a disc, px, and over its standard deviation, after the first frames."""
+    target = disc(line((70.0, 128.0), (speed, 0.0)), np.full(len(TIMES), DISC_RADIUS), level=170.0)
+    scene = Scene("disc", (Plane(kind, BACKGROUND),), target)
+    found = jacoflow.track.track(scene.frames(), scene.start_box)
+    errors = np.abs(found.position - scene.centres)[4:]
+    return float(errors.max()), float((errors / np.sqrt(found.covariance[4:, :, 0, 0])).max())
+
+
 def rows() -> dict[str, list[float]]:
     """One value for each scene, or target of a recording."""
     (tracker,) = ours(("layered",))
@@ -88,6 +101,11 @@ def rows() -> dict[str, list[float]]:
         figures = scores(tracker.run(scene.frames(), scene.start_box), Truth.of(scene))
         found.setdefault(row, []).append(figures["success"])
         found["ms"].append(figures["milliseconds"])
+    for kind in DISC_KINDS:
+        for speed in (0.4, 0.8, 1.2, 2.0):
+            error, deviations = of_disc(kind, speed)
+            found.setdefault("disc, px", []).append(error)
+            found.setdefault("disc, deviations", []).append(deviations)
     if os.environ.get("JACOFLOW_DATA"):
         for each in tracking_recordings.read_all(Path(os.environ["JACOFLOW_DATA"])):
             if not isinstance(each, str):
