@@ -30,7 +30,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("flow.detail_bias", "motion that the finest detail of the frames contradicts over wide windows is moved"),
     ("flow.detail_scatter", "differences with and without the finest detail widen the covariance"),
     ("flow.step", "the flow moves by what smoothed frames leave of it in narrow windows beyond chance"),
-    ("flow.window_curvature", "what is left of the flow leaves out its curvature within a site's window"),
+    ("flow.unrelated_frames", "frames that differ as independent noise does are contradicted everywhere"),
     ("flow.step_scatter", "steps where the finest detail disagrees are shorter"),
     ("flow.step_side", "narrow frames take no step"),
     ("flow.wide_remainder", "chance is compared in wide surroundings, too, before what is left widens the covariance"),

@@ -13,10 +13,10 @@
 //! (small or curved objects). The flow moves by a share of the smoothed frames' remainder, since the finest
 //! detail may be biased; the covariance includes the mean square of the remainder of the frames as they are.
 
-use super::data_term::{COUNT, DataOptions, DataTerm, ERROR, MOTION, normal, right};
+use super::data_term::{DataOptions, DataTerm, MEANS};
 use super::descent::DescentPlan;
 use super::nodes::{NodeAxis, binomial_mean, sites_around};
-use super::planes::{LEFT, Planes, SITE_SPACING};
+use super::planes::{LEFT, Planes};
 use super::pyramid::ComparedFrames;
 use super::refine::SITES_PER_NODE;
 use super::workspace::Workspace;
@@ -24,11 +24,11 @@ use crate::ablation::keeps;
 use crate::image::Spline;
 use crate::math::median;
 use crate::parallel;
-use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
+use crate::simd::{Level, SimdReal};
 use std::f64::consts::PI;
 
 /// Binomial means of the sums, so that windows have standard deviations of 3.4, 8.7 and 14.3 px.
-const MEANS: [usize; 3] = [0, 2, 6];
+const BINOMIAL_MEANS: [usize; 3] = [0, 2, 6];
 /// Standard deviations of these windows, px.
 const WINDOWS: [f64; 3] = [3.4, 8.7, 14.3];
 /// Information, over residual energy, that smoothness adds.
@@ -58,7 +58,7 @@ const DOUBTFUL_SHARE: f64 = 0.1;
 const SMOOTHED_NOISE: f64 = 0.48;
 
 /// Sums of `P_uu, P_uv, P_vv`, of the right sides that the motion leaves, and of the residual energy.
-type NodeSums = [f64; 6];
+type NodeSums = [f64; MEANS];
 /// Entries `xx, xy, yy` of a symmetric matrix.
 type Square = [f64; 3];
 
@@ -91,11 +91,12 @@ impl DetailBias {
         let axes = (NodeAxis::of(motion.width), NodeAxis::of(motion.height));
         let size = (axes.0.count, axes.1.count);
         let term = DataTerm::new(plan.simd, DataOptions::default(), pool);
-        let mut data = space.planes(motion.width, motion.height, COUNT);
+        let mut data = space.planes(motion.width, motion.height, MEANS);
         let smooth_std = residual_std.map(|std| T::from_f64(SMOOTHED_NOISE * std.to_f64()));
         let mut sums = [(&level.splines, residual_std), (&smoothed, smooth_std)].map(|(splines, std)| {
-            term.linearise(level.size, &level.views_of(splines, ComparedFrames::All), motion, std, &mut data);
-            node_sums(plan.simd, &data, motion, size)
+            let views = level.views_of(splines, ComparedFrames::All);
+            term.linearise_remainder(level.size, &views, motion, std, &mut data);
+            node_sums(plan.simd, &data, size)
         });
         smoothed.into_iter().map(Spline::into_memory).for_each(|memory| space.keep(Planes::of_samples(memory)));
         space.keep(data);
@@ -107,7 +108,7 @@ impl DetailBias {
         let narrow = sums[1].clone();
         let mut differences = Vec::new();
         let mut done = 0;
-        let scatter = MEANS.map(|means| {
+        let scatter = BINOMIAL_MEANS.map(|means| {
             for _ in done..means {
                 for sums in &mut sums {
                     binomial_mean(sums, size);
@@ -176,17 +177,9 @@ impl DetailBias {
 }
 
 /// Sums in triangular windows around the nodes, row by row; they overlap by half.
-fn node_sums<T: SimdReal>(
-    simd: Level,
-    data: &Planes<T>,
-    motion: &Planes<T>,
-    (columns, rows): (usize, usize),
-) -> Vec<NodeSums> {
+fn node_sums<T: SimdReal>(simd: Level, data: &Planes<T>, (columns, rows): (usize, usize)) -> Vec<NodeSums> {
     let row = |n: usize| {
-        let mut down = Planes::new(data.width, 1, NodeSums::default().len());
-        for (y, weight) in sites_around(n, data.height) {
-            dispatch(simd, AddSites { data, motion, y, weight, sums: &mut down });
-        }
+        let down = data.weighted_rows(simd, sites_around(n, data.height));
         let node = |n: usize| {
             let sum =
                 |k: usize| sites_around(n, data.width).map(|(x, weight)| weight * down.at(k, x, 0).to_f64()).sum();
@@ -195,63 +188,6 @@ fn node_sums<T: SimdReal>(
         (0..columns).map(node).collect::<Vec<NodeSums>>()
     };
     parallel::map(0..rows, row).concat()
-}
-
-/// Adds normal equations of the sites of row `y` for the flow that their motion, with its curvature, leaves.
-struct AddSites<'a, T> {
-    data: &'a Planes<T>,
-    motion: &'a Planes<T>,
-    y: usize,
-    weight: f64,
-    sums: &'a mut Planes<T>,
-}
-
-impl<T: SimdReal> Kernel<T> for AddSites<'_, T> {
-    type Output = ();
-    #[inline(always)]
-    fn run<V: Lanes<Scalar = T>>(self) {
-        let Self { data, motion, y, weight, sums } = self;
-        let (stride, weight) = (motion.stride(), V::constant(weight));
-        let (data, here, to) = (data.row(y), motion.row(y), sums.row_mut(0));
-        let (above, below) = (motion.row(y.saturating_sub(1)), motion.row((y + 1).min(motion.height - 1)));
-        // Over a site's window, curved flow has the mean `u + sigma^2 (u_xx + u_yy) / 2`. Second derivatives
-        // are differences of the slopes two sites apart; at a border of one site, half as large.
-        let square = if keeps("flow.window_curvature") { DataOptions::default().sigma.powi(2) } else { 0.0 };
-        let window = V::constant(0.5 * square / (2.0 * SITE_SPACING));
-        let mut slopes = here[2 * stride..4 * stride].to_vec();
-        for line in slopes.chunks_exact_mut(stride) {
-            (line[LEFT - 1], line[LEFT + motion.width]) = (line[LEFT], line[LEFT + motion.width - 1]);
-        }
-        for at in (LEFT..stride - LEFT).step_by(V::LANES) {
-            let mut known = [V::zero(); MOTION];
-            for (k, known) in known.iter_mut().enumerate() {
-                *known = V::load(&here[k * stride + at..]);
-            }
-            for c in 0..2 {
-                let (slope, across) = (c * stride + at, (4 + c) * stride + at);
-                let along = V::load(&slopes[slope + 1..]) - V::load(&slopes[slope - 1..]);
-                let change = along + (V::load(&below[across..]) - V::load(&above[across..]));
-                known[c] = change.mul_add(window, known[c]);
-            }
-            let planes = [normal(0, 0), normal(0, 1), normal(1, 1)];
-            for (k, plane) in planes.into_iter().enumerate() {
-                add(&mut to[k * stride + at..], weight, V::load(&data[plane * stride + at..]));
-            }
-            for c in 0..2 {
-                let mut left = V::load(&data[right(c) * stride + at..]);
-                for (k, &known) in known.iter().enumerate() {
-                    left = V::load(&data[normal(c, k) * stride + at..]).neg_mul_add(known, left);
-                }
-                add(&mut to[(3 + c) * stride + at..], weight, left);
-            }
-            add(&mut to[5 * stride + at..], weight, V::load(&data[ERROR * stride + at..]));
-        }
-    }
-}
-
-#[inline(always)]
-fn add<V: Lanes>(sum: &mut [V::Scalar], weight: V, value: V) {
-    value.mul_add(weight, V::load(sum)).store(sum);
 }
 
 /// Mean squares of vectors whose components are at most `most` px, with a standard deviation of 8 px around

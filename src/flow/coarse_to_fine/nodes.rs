@@ -34,18 +34,24 @@ impl NodeAxis {
 
 /// Mean of each node and its neighbours with the weights `[1, 2, 1] / 4` along both axes.
 pub(super) fn binomial_mean<const N: usize>(nodes: &mut [[f64; N]], (width, height): (usize, usize)) {
-    let mean = |[a, b, c]: [&[f64; N]; 3]| std::array::from_fn(|k| 0.25 * (a[k] + c[k]) + 0.5 * b[k]);
-    let around = |n: usize, count: usize| [n.saturating_sub(1), n, (n + 1).min(count - 1)];
-    for row in nodes.chunks_exact_mut(width.max(1)) {
-        let old = row.to_vec();
-        for (x, out) in row.iter_mut().enumerate() {
-            *out = mean(around(x, width).map(|x| &old[x]));
+    let Some(&last) = nodes.last() else { return };
+    let mean = |out: &mut [[f64; N]], around: [&[[f64; N]]; 3]| {
+        // Loops over single values, so that the compiler uses lanes.
+        let [before, here, after] = around.map(|nodes| nodes.as_flattened().iter());
+        for (out, ((a, b), c)) in out.as_flattened_mut().iter_mut().zip(before.zip(here).zip(after)) {
+            *out = 0.25 * (a + c) + 0.5 * b;
         }
+    };
+    let mut old = vec![last; width + 2];
+    for row in nodes.chunks_exact_mut(width) {
+        old[1..=width].copy_from_slice(row);
+        (old[0], old[width + 1]) = (old[1], old[width]);
+        mean(row, [&old, &old[1..], &old[2..]]);
     }
     let old = nodes.to_vec();
-    for (n, out) in nodes.iter_mut().enumerate() {
-        let (x, y) = (n % width, n / width);
-        *out = mean(around(y, height).map(|y| &old[y * width + x]));
+    let line = |y: usize| &old[y * width..(y + 1) * width];
+    for (y, row) in nodes.chunks_exact_mut(width).enumerate() {
+        mean(row, [line(y.saturating_sub(1)), line(y), line((y + 1).min(height - 1))]);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Planes of values on the sites (every second pixel) of one pyramid level.
 
-use crate::simd::SimdReal;
+use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 
 /// Distance of the sites, px of their level: every second pixel.
 pub(super) const SITE_SPACING: f64 = 2.0;
@@ -99,6 +99,15 @@ impl<T: SimdReal> Planes<T> {
         &mut self.data[..len]
     }
 
+    /// The sum of some rows, each times its weight, as planes of one row.
+    pub fn weighted_rows(&self, simd: Level, rows: impl Iterator<Item = (usize, f64)>) -> Self {
+        let mut sum = Self::new(self.width, 1, self.count);
+        for (y, weight) in rows {
+            dispatch(simd, AddRow { row: self.row(y), weight, sum: sum.row_mut(0) });
+        }
+        sum
+    }
+
     #[inline]
     pub fn line(&self, k: usize, y: usize) -> &[T] {
         let first = k * self.stride() + LEFT;
@@ -113,5 +122,22 @@ impl<T: SimdReal> Planes<T> {
     #[inline]
     pub fn at(&self, k: usize, x: usize, y: usize) -> T {
         self.line(k, y)[x]
+    }
+}
+
+struct AddRow<'a, T> {
+    row: &'a [T],
+    weight: f64,
+    sum: &'a mut [T],
+}
+
+impl<T: SimdReal> Kernel<T> for AddRow<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<V: Lanes<Scalar = T>>(self) {
+        let weight = V::constant(self.weight);
+        for (row, sum) in self.row.chunks_exact(V::LANES).zip(self.sum.chunks_exact_mut(V::LANES)) {
+            V::load(row).mul_add(weight, V::load(sum)).store(sum);
+        }
     }
 }

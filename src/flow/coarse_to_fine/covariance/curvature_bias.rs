@@ -46,7 +46,7 @@ pub(super) fn curvature_bias<T: SimdReal>(
     let size = statistics.size();
     let mut products = vec![[0.0; ENTRIES]; size.0 * size.1];
     for (losses, shares) in
-        [(lost(motion, size), shares.fixed), (lost_to_windows(simd, motion, statistics), shares.chosen)]
+        [(lost(simd, motion, size), shares.fixed), (lost_to_windows(simd, motion, statistics), shares.chosen)]
     {
         for (out, loss) in products.iter_mut().zip(losses) {
             add_loss(out, &loss, shares);
@@ -74,20 +74,18 @@ pub(super) fn motion_at<T: SimdReal>(motion: &Planes<T>, (x, y): (usize, usize))
 }
 
 /// `(1 - G)^2` of the motion at the nodes, G of [`FIXED_SIGMA`] px.
-fn lost<T: SimdReal>(motion: &Planes<T>, (width, height): (usize, usize)) -> Vec<Loss> {
+fn lost<T: SimdReal>(simd: Level, motion: &Planes<T>, (width, height): (usize, usize)) -> Vec<Loss> {
     // G and G G.
     let kernels = [FIXED_SIGMA / SITE_SPACING, FIXED_SIGMA / SITE_SPACING * SQRT_2];
     let along = kernels.map(|s| gaussians::<T>(s, (width, SITES_PER_NODE), motion.width));
     let across = kernels.map(|s| gaussians::<T>(s, (height, SITES_PER_NODE), motion.height));
     let rows: Vec<Vec<Loss>> = parallel::map(0..height, |y| {
         let mut lost: Vec<Loss> = (0..width).map(|x| motion_at(motion, (x, y))).collect();
-        let mut down = vec![T::from_f64(0.0); motion.width];
-        for k in 0..MOTION {
-            for (factor, (across, along)) in [-2.0, 1.0].into_iter().zip(across.iter().zip(&along)) {
-                down.fill(T::from_f64(0.0));
-                for (site, &weight) in (across[y].first..).zip(&across[y].weights) {
-                    down.iter_mut().zip(motion.line(k, site)).for_each(|(d, m)| *d += weight * *m);
-                }
+        for (factor, (across, along)) in [-2.0, 1.0].into_iter().zip(across.iter().zip(&along)) {
+            let sites = (across[y].first..).zip(across[y].weights.iter().map(|weight| weight.to_f64()));
+            let down = motion.weighted_rows(simd, sites);
+            for k in 0..MOTION {
+                let down = down.line(k, 0);
                 for (lost, taps) in lost.iter_mut().zip(along) {
                     lost[k] += factor * dot(&down[taps.first..], &taps.weights).to_f64();
                 }
@@ -251,7 +249,7 @@ mod tests {
             }
         }
         let size = (width.div_ceil(SITES_PER_NODE), height.div_ceil(SITES_PER_NODE));
-        let lost = lost(&motion, size);
+        let lost = lost(Level::SCALAR, &motion, size);
         assert!(lost.iter().all(|l| l[0].abs() < 1e-12));
         let g = (-0.5 * (k * FIXED_SIGMA).powi(2)).exp();
         for x in 8..size.0 - 8 {

@@ -2,7 +2,7 @@
 
 use super::View;
 use super::dense::dense_row;
-use super::moments::{ERROR, horizontal, normal, right, vertical};
+use super::moments::{ERROR, MEANS, horizontal, normal, right, vertical};
 use super::products::{Weights, products_row, residuals, vertical_stencils};
 use super::scratch::{CHUNK, Columns, IMAGE, PRODUCTS, RING, Scratch};
 use super::warp::warp_row;
@@ -13,8 +13,18 @@ use std::ops::Range;
 /// Maximum site columns of a tile, so that its rows fit the second-level cache.
 const TILE: usize = 320;
 
+/// What a band sums up in the windows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sums {
+    /// Moments of the products, for the whole motion.
+    Moments,
+    /// Means of the products, for the flow that the motion leaves.
+    Means,
+}
+
 /// Inputs that all bands of a level share.
 pub(super) struct Task<'a, T> {
+    pub sums: Sums,
     /// Size of the level, pixels.
     pub size: (usize, usize),
     pub views: &'a [View<'a, T>],
@@ -90,7 +100,11 @@ impl<T: SimdReal> Band<'_, T> {
         let rows = [y - 1, y, y + 1].map(|y| &images[y % RING * row..(y % RING + 1) * row]);
         let stencil = self.scratch.stencil.all();
         vertical_stencils::<V>(columns, rows, stencil);
-        let weights = Weights { gradient: V::splat(self.task.gradient), inverse: V::splat(self.task.inverse) };
+        let weights = Weights {
+            gradient: V::splat(self.task.gradient),
+            inverse: V::splat(self.task.inverse),
+            motion: V::constant(f64::from(u8::from(self.task.sums == Sums::Moments))),
+        };
         let products = &mut self.scratch.products.all()[slot..slot + columns.row(PRODUCTS)];
         products_row::<T, V>(columns, weights, stencil, rows[1], products);
         if y.is_multiple_of(4) && self.rows.contains(&(y / 2)) {
@@ -121,13 +135,18 @@ impl<T: SimdReal> Band<'_, T> {
         let out = &mut self.out[(site - self.rows.start) * len..(site + 1 - self.rows.start) * len];
         let at = |plane: usize| plane * self.task.stride + GRID_LEFT + columns.from;
         let mut starts = [0; 64];
+        let count = if self.task.sums == Sums::Moments { PRODUCTS } else { MEANS };
         // Plane by plane: the output of one filter is still in the nearest cache when the other reads it.
-        for plane in 0..PRODUCTS {
+        for plane in 0..count {
             for (k, start) in starts[..ring].iter_mut().enumerate() {
                 *start = (2 * site + k) % ring * columns.row(PRODUCTS) + plane * row;
             }
             let rows = &starts[..ring];
             match plane {
+                _ if self.task.sums == Sums::Means => {
+                    vertical::<V, 1>(columns, products, rows, taps, planes);
+                    horizontal::<V, 1>(columns, &planes[..row], taps, out, [at(plane)]);
+                }
                 0..3 => {
                     let first = normal(0, 0) + 6 * plane;
                     vertical::<V, 3>(columns, products, rows, taps, planes);

@@ -14,7 +14,8 @@
 //! (21) of WO2010/098160, transported to the site. The terms by which a deforming motion changes the gradient
 //! are already in the warped views. Warping towards the middle of the views follows B. D. Lucas and T.
 //! Kanade, "An iterative image registration technique with an application to stereo vision", 1981. The right
-//! side holds the whole motion, so that iterations do not undo the smoothing by the window.
+//! side holds the whole motion, so that iterations do not undo the smoothing by the window. Without the
+//! motion (`b = -R`) it is what the motion leaves of the flow, curved motion within the window included.
 //!
 //! `band` runs rows of sites through `dense` (motion at every pixel), `warp` (views along it), `products`
 //! (a pixel's equations) and `moments` (their windowed sums); `scratch` holds the rows.
@@ -30,7 +31,7 @@ mod warp;
 
 #[cfg(test)]
 pub(super) use moments::SUMMARY;
-pub(super) use moments::{COUNT, ENERGY, ERROR, SEEN, UU, UV, VALID, VV, normal, right, summary};
+pub(super) use moments::{COUNT, ENERGY, ERROR, MEANS, SEEN, UU, UV, VALID, VV, normal, right, summary};
 pub(super) use warp::{is_usable, sample_views};
 
 use super::planes::Planes;
@@ -38,7 +39,7 @@ use crate::image::Spline;
 use crate::parallel;
 use crate::simd::{Level, SimdReal, dispatch};
 use crate::types::Mask;
-use band::{Band, Task};
+use band::{Band, Sums, Task};
 use moments::taps;
 use scratch::Scratch;
 use std::sync::{Mutex, PoisonError};
@@ -146,12 +147,37 @@ impl<'a, T: SimdReal> DataTerm<'a, T> {
         scale: Option<T>,
         out: &mut Planes<T>,
     ) -> Vec<T> {
+        self.sum(Sums::Moments, (size, views), motion, scale, out)
+    }
+
+    /// The [`MEANS`] planes of the normal equations for the flow that the motion leaves: the windows' means of
+    /// `P_uu`, `P_uv`, `P_vv`, `q_u`, `q_v` and `e`, where `q` has `-R` on its right side.
+    pub fn linearise_remainder(
+        &self,
+        size: (usize, usize),
+        views: &[View<'_, T>],
+        motion: &Planes<T>,
+        scale: Option<T>,
+        out: &mut Planes<T>,
+    ) {
+        self.sum(Sums::Means, (size, views), motion, scale, out);
+    }
+
+    fn sum(
+        &self,
+        sums: Sums,
+        (size, views): ((usize, usize), &[View<'_, T>]),
+        motion: &Planes<T>,
+        scale: Option<T>,
+        out: &mut Planes<T>,
+    ) -> Vec<T> {
         let (width, height) = (size.0.div_ceil(2), size.1.div_ceil(2));
-        out.reshape(width, height, COUNT);
+        out.reshape(width, height, if sums == Sums::Moments { COUNT } else { MEANS });
         if width == 0 || height == 0 {
             return Vec::new();
         }
         let task = Task {
+            sums,
             size,
             views,
             motion,

@@ -14,7 +14,7 @@
 //! with `x_0, x_1, x_2 = 1, x, y` px from the site, `g` the window (sum 1), `G` the squared weight of the
 //! gradient rows and `w` between 0 (not usable) and 1. [`normal`] and [`right`] name the planes.
 
-use super::{scratch::CHUNK, scratch::Columns, scratch::LEFT};
+use super::{scratch::CHUNK, scratch::Columns, scratch::LEFT, scratch::PRODUCTS};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::{self, Planes};
 use crate::parallel::for_each_band;
@@ -49,6 +49,8 @@ pub(in super::super) const ENERGY: usize = 3;
 /// Share of the window that is usable.
 pub(in super::super) const SEEN: usize = 4;
 pub(in super::super) const SUMMARY: usize = 5;
+/// Planes of means, in the order of the products, of which the last one (validity) is left out.
+pub(in super::super) const MEANS: usize = PRODUCTS - 1;
 
 /// Summary of a data term for later stages: all its planes would be most of an estimate's memory.
 pub(in super::super) fn summary<T: SimdReal>(space: &PlanePool<T>, data: &Planes<T>) -> Planes<T> {

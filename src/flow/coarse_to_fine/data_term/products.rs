@@ -48,6 +48,8 @@ pub(super) struct Weights<V> {
     pub gradient: V,
     /// 1 / (c s), the inverse of the `R` at which a pixel has weight 1/2; 0: all have weight 1.
     pub inverse: V,
+    /// 1: the right sides hold the motion; 0: they do not.
+    pub motion: V,
 }
 
 #[inline(always)]
@@ -111,7 +113,7 @@ fn products<V: Lanes>(near: [[V; 3]; 5], [u, v, valid]: [V; 3], weights: Weights
     let [ry, _, _] = along(near[4]);
     // Unusable pixels may hold any value: it must not enter as 0 times infinity.
     let seen = V::zero().lt(valid);
-    let (u, v) = (V::select(seen, u, V::zero()), V::select(seen, v, V::zero()));
+    let [u, v] = [u, v].map(|flow| V::select(seen, flow, V::zero()) * weights.motion);
     let b1 = ax.mul_add(u, ay.mul_add(v, -r));
     let b2 = axx.mul_add(u, axy.mul_add(v, -rx));
     let b3 = axy.mul_add(u, ayy.mul_add(v, -ry));

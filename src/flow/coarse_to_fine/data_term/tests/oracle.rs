@@ -4,6 +4,9 @@ use crate::flow::coarse_to_fine::data_term::*;
 use crate::parallel::Threads;
 use crate::types::Frame;
 
+/// First of the oracle's planes for what the motion leaves of the flow, behind those of all moments.
+pub(super) const REST: usize = COUNT;
+
 pub(super) struct Case {
     pub size: (usize, usize),
     pub frames: Vec<Frame<f64>>,
@@ -46,7 +49,7 @@ impl Case {
         }
     }
 
-    pub fn run<T: SimdReal>(&self, level: Level, threads: usize) -> (Planes<T>, Vec<T>) {
+    pub fn run<T: SimdReal>(&self, level: Level, threads: usize) -> (Planes<T>, Planes<T>, Vec<T>) {
         let pool = Pool::default();
         let term = DataTerm::<T>::new(level, self.options, &pool);
         let splines: Vec<Spline<T>> =
@@ -68,13 +71,14 @@ impl Case {
                 }
             }
         }
-        let mut out = Planes::default();
+        let (mut out, mut means) = (Planes::default(), Planes::default());
         let scale = self.scale.map(T::from_f64);
         Threads::new(Some(threads)).unwrap().install(|| {
             // Twice, so that content left in memory is seen to do no harm.
             term.linearise(self.size, &views, &motion, scale, &mut out);
             let residuals = term.linearise(self.size, &views, &motion, scale, &mut out);
-            (out, residuals)
+            term.linearise_remainder(self.size, &views, &motion, scale, &mut means);
+            (out, means, residuals)
         })
     }
 
@@ -100,8 +104,8 @@ impl Case {
         })
     }
 
-    /// Seven products a pixel, and |R| at the pixels of the subsample.
-    fn products(&self) -> (Vec<[f64; 7]>, Vec<f64>) {
+    /// Seven products a pixel, the two right sides without the motion, and |R| at the pixels of the subsample.
+    fn products(&self) -> (Vec<[f64; 9]>, Vec<f64>) {
         let (w, h) = self.size;
         let (edge_x, edge_y) = (w as f64 - 2.0, h as f64 - 2.0);
         let [times, means, rates] = self.weights();
@@ -127,7 +131,7 @@ impl Case {
             }
         }
         let (b, d, s) = ([1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0], [-0.5, 0.0, 0.5], [1.0, -2.0, 1.0]);
-        let (mut out, mut residuals) = (vec![[0.0; 7]; w * h], Vec::new());
+        let (mut out, mut residuals) = (vec![[0.0; 9]; w * h], Vec::new());
         for y in 1..h.max(1) - 1 {
             for x in 1..w.max(1) - 1 {
                 let stencil = |image: &[f64], kx: [f64; 3], ky: [f64; 3]| {
@@ -155,6 +159,8 @@ impl Case {
                     weight * (ay * b1 + g * (axy * b2 + ayy * b3)),
                     weight * (r0 * r0 + g * (rx * rx + ry * ry)),
                     ok,
+                    -weight * (ax * r0 + g * (axx * rx + axy * ry)),
+                    -weight * (ay * r0 + g * (axy * rx + ayy * ry)),
                 ];
                 if x % 4 == 0 && y % 4 == 0 && ok > 0.0 {
                     residuals.push(r0.abs());
@@ -177,7 +183,7 @@ impl Case {
         let mut entries: Vec<_> = (0..36).map(|e| (normal(e / 6, e % 6), e / 6, e % 6)).collect();
         entries.sort_unstable();
         entries.dedup_by_key(|e| e.0);
-        let mut out = vec![vec![0.0; sw * sh]; COUNT];
+        let mut out = vec![vec![0.0; sw * sh]; REST + 2];
         for site in 0..sw * sh {
             let (cx, cy) = (2 * (site % sw) as isize, 2 * (site / sw) as isize);
             for dy in -radius..=radius {
@@ -197,6 +203,7 @@ impl Case {
                     }
                     out[ERROR][site] += g * p[5];
                     out[VALID][site] += g * p[6];
+                    (0..2).for_each(|c| out[REST + c][site] += g * p[7 + c]);
                 }
             }
         }
