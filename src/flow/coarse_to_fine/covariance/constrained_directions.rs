@@ -34,24 +34,26 @@ impl ConstrainedDirections {
         };
         let mut sites = vec![NONE; width * height];
         for_each_band(&mut sites, width, |_, rows, out| {
+            // Down the columns, with a zero at both ends; then along the row.
+            let mut down = vec![0.0; width + 2];
             let mut sums = [(); 3].map(|()| vec![0.0; width]);
             for (y, out) in rows.zip(out.chunks_exact_mut(width)) {
                 let (rows, node_row) = (around(y, height), node(y, height));
                 for (sums, k) in sums.iter_mut().zip([UU, UV, VV]) {
-                    sums.fill(0.0);
+                    down.fill(0.0);
                     for y in rows.clone() {
-                        sums.iter_mut().zip(data.line(k, y)).for_each(|(sum, value)| *sum += value.to_f64());
+                        down[1..].iter_mut().zip(data.line(k, y)).for_each(|(sum, value)| *sum += value.to_f64());
                     }
+                    let three = down.iter().zip(&down[1..]).zip(&down[2..]).map(|((a, b), c)| a + b + c);
+                    sums.iter_mut().zip(three).for_each(|(sum, three)| *sum = three);
                 }
                 let sufficient: Vec<f64> = (0..nodes.0).map(|x| noise.sufficient_information(x, node_row)).collect();
                 for (x, out) in out.iter_mut().enumerate() {
-                    let columns = around(x, width);
-                    let share = 1.0 / (columns.len() * rows.len()) as f64;
-                    let mean = |sums: &[f64]| share * sums[columns.clone()].iter().sum::<f64>();
-                    let [a, b, c] = [mean(&sums[0]), mean(&sums[1]), mean(&sums[2])];
+                    let count = (around(x, width).len() * rows.len()) as f64;
+                    let [a, b, c] = [sums[0][x], sums[1][x], sums[2][x]];
                     // The usual case, without a root.
-                    if 0.5 * (a + c) - (0.5 * (a - c).abs() + b.abs()) < sufficient[node(x, width)] {
-                        *out = noise.unconstrained([a, b, c], node(x, width), node_row);
+                    if 0.5 * (a + c) - (0.5 * (a - c).abs() + b.abs()) < count * sufficient[node(x, width)] {
+                        *out = noise.unconstrained([a, b, c].map(|sum| sum / count), node(x, width), node_row);
                     }
                 }
             }
@@ -68,7 +70,9 @@ impl ConstrainedDirections {
     ) -> Self {
         let constrained: Vec<bool> = sites.iter().map(|directions| *directions == NONE).collect();
         let count = constrained.iter().filter(|constrained| **constrained).count();
-        let mut distances = if (count as f64) < MIN_CONSTRAINED_SHARE * constrained.len() as f64 || count == 0 {
+        let mut distances = if count == sites.len() {
+            vec![0.0; sites.len()]
+        } else if (count as f64) < MIN_CONSTRAINED_SHARE * constrained.len() as f64 || count == 0 {
             let unknown = |directions: &UnconstrainedDirections| {
                 if [NONE, ALL].contains(directions) { 0.0 } else { f64::INFINITY }
             };
@@ -79,7 +83,11 @@ impl ConstrainedDirections {
         (0..distances.len()).filter(|&n| !is_usable(n)).for_each(|n| distances[n] = 0.0);
         let reference_sites = (0..constrained.len()).map(|n| constrained[n] && is_usable(n)).collect();
         let mut out = Self { width, distances, reference_sites, directions: Vec::new() };
-        out.directions = (0..nodes.0 * nodes.1).map(|n| out.mean_directions(sites, n % nodes.0, n / nodes.0)).collect();
+        out.directions = if count == sites.len() {
+            vec![[0.0; 3]; nodes.0 * nodes.1]
+        } else {
+            (0..nodes.0 * nodes.1).map(|n| out.mean_directions(sites, n % nodes.0, n / nodes.0)).collect()
+        };
         out
     }
 

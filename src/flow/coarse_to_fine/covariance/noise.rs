@@ -191,6 +191,9 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         let mut remaining = RemainingNoise { density: inverse.map(|entry| entry * scale), flow: 0.0, slopes: [0.0; 2] };
         for (l, sigma) in self.statistics.sigmas.iter().enumerate() {
             let weight = [0, 1].map(|k| weights[l][k] + if l == widest { nothing[k] } else { 0.0 });
+            if weight == [0.0; 2] {
+                continue;
+            }
             let (flow, slope) = (flow_share / (4.0 * PI * sigma.powi(2)), slope_share / (8.0 * PI * sigma.powi(4)));
             let [[mean_x, across_x], [mean_y, across_y]] = self.support.edges(x, y).map(|edge| at_edge(&edge, *sigma));
             remaining.flow += weight[0] * flow * mean_x * mean_y;
@@ -234,8 +237,10 @@ fn excess<T: SimdReal>(statistics: &WindowStatistics<T>, data: &Planes<T>) -> f6
         let (mut weights, mut changes) = (0.0, 0.0);
         for l in 1..statistics.sigmas.len() {
             let [weight, _] = statistics.weights(l, x, y);
-            weights += weight;
-            changes += weight * statistics.change(l - 1, x, y);
+            if weight > 0.0 {
+                weights += weight;
+                changes += weight * statistics.change(l - 1, x, y);
+            }
         }
         let [a, b, c] = positive_definite(statistics.information(x, y));
         let density = statistics.energy(x, y) * (a + c) / (a * c - b * b);
