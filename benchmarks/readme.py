@@ -64,6 +64,8 @@ RECORDED_MATCHERS = {
     "OpenCV BM 15": "OpenCV BM",
 }
 LIMITS = "Limits of a step"
+RATES = "Rates of large steps"
+UNRELATED = "Unrelated frames"
 WAVES = "Turning waves"
 TWO_MOTIONS = "Two motions in a region"
 NOISE = "Noise of a pair"
@@ -125,6 +127,19 @@ def limits(record: Record) -> list[str]:
     names |= {rival: rival for rival in ("OpenCV DIS medium", "OpenCV Farneback")}
     body = [[str(row["step"]), *(number(row.get(name), 3) for name in names)] for row in record.sections[LIMITS]]
     return lines(["median error, px", *names.values()], body)
+
+
+def large_rates(record: Record) -> list[str]:
+    """Errors of measured rates and what is stated, by the step."""
+    names = ("pair, error", "pair, std", "triple, error", "triple, std")
+    body = [[str(row["step"]), *(number(row.get(name), 4) for name in names)] for row in record.sections[RATES]]
+    return lines(["step", *names], body)
+
+
+def unrelated(record: Record) -> list[str]:
+    """Shares of valid sites between frames with little or nothing in common."""
+    body = [[str(row["frames"]), *(number(row.get(name), 3) for name in ("pair", "triple"))] for row in record.sections[UNRELATED]]
+    return lines(["valid", "pair", "triple"], body)
 
 
 def turning_waves(record: Record) -> list[str]:
@@ -316,6 +331,8 @@ TABLES: dict[str, tuple[Callable[[Record], list[str]], tuple[str, ...]]] = {
     "stereo_tracking": (stereo_tracking, tuple(f"Stereo tracking, {scene}" for scene in STEREO_SCENES)),
     "motion": (motion, (CHANCE, VIEWS)),
     "limits": (limits, (LIMITS,)),
+    "large_rates": (large_rates, (RATES,)),
+    "unrelated": (unrelated, (UNRELATED,)),
     "turning_waves": (turning_waves, (WAVES,)),
     "two_motions": (two_motions, (TWO_MOTIONS,)),
     "turning_discs": (turning_discs, (DISCS,)),

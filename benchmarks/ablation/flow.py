@@ -1,6 +1,6 @@
 """Coarse-to-fine estimate between frames that are not equally bright, beside saturated pixels, over large motions, beside
 a motion boundary (of three frames too), beside a mask's edge and of undersampled texture: errors, px; share of errors
-above 1 px that neither status nor standard deviation states; change by saturated pixels, standard deviations; bias of
+above 1 px that neither status nor standard deviation states; share of frames of independent noise that is taken for motion; change by saturated pixels, standard deviations; bias of
 pairs in noise, px; errors in waves and in narrow frames, px; share of errors outside 95 % intervals, of undersampled
 texture and of discs that smoothness holds back, whose own errors are relative to their motion; time on equal frames."""
 
@@ -37,7 +37,7 @@ SHIFTS = ((56, 0), (0, -64), (80, 60))
 def rows() -> dict[str, list[float]]:
     """One value for each change and seed, each seed, each shift and seed."""
     names = (
-        "equal", "changed", "specks", "shifts", "boundary", "three frames", "silent", "undersampled", "noise",
+        "equal", "changed", "specks", "shifts", "boundary", "three frames", "silent", "unrelated", "undersampled", "noise",
         "waves", "narrow", "mask", "outside", "discs", "disc errors", "ms",
     )
     found: dict[str, list[float]] = {name: [] for name in names}
@@ -58,6 +58,10 @@ def rows() -> dict[str, list[float]]:
         std = np.hypot(field.std("u"), field.std("v"))[near]
         is_silent = (distance > 5 * std) & (field.status[near] == jacoflow.Status.OK)
         found["silent"].append(float(is_silent[distance > 1].mean()))
+        random = np.random.default_rng(seed)
+        noise = [random.integers(0, 256, (160, 160)).astype(np.uint8) for _ in range(3)]
+        for count in (2, 3):
+            found["unrelated"].append(float(jacoflow.flow(*noise[:count], threads=1).valid.mean()))
         found["boundary"].append(float(distance.mean()))
         three, flow, near = scenes.layered(seed, 3)
         field = jacoflow.flow(*three, covariance=False, threads=1)

@@ -19,6 +19,12 @@ Row = dict[str, object]
 TURNS, ENLARGEMENTS, SHIFTS = (5, 10, 15, 20, 30), (1.05, 1.1, 1.2, 1.3, 1.5), (8, 16, 32, 48, 64)
 DIFFERENCES, NOISES, FRACTIONS = (0.1, 0.2, 0.3, 0.5, 1.0), (0.0, 1.0, 2.0, 4.0, 8.0, 16.0), (0.25, 0.37, 0.8)
 SEEDS = (0, 1, 2)
+RATES = {
+    "turn by 15 degrees": (steps.turn(np.radians(15)), "curl", 2 * np.radians(15)),
+    "enlargement by 1.20": (1.2 * np.eye(2), "divergence", 2 * np.log(1.2)),
+    "enlargement by 0.82": (0.82 * np.eye(2), "divergence", 2 * np.log(0.82)),
+}
+"""Steps -> their matrices, what is measured of them, and its truth."""
 RADII, ANGLES = (15.0, 20.0, 25.0, 30.0, 45.0), (0.02, 0.06, 0.18)
 SQUARE = (40, 40, 81, 81)
 """The region that is measured."""
@@ -66,6 +72,55 @@ def limits(seeds: tuple[int, ...]) -> list[Row]:
                     error = np.linalg.norm(run(*grey) - truth, axis=-1)[inside]
                     found.setdefault(rival, []).append(float(np.median(error)))
         rows.append({"step": name} | {key: float(np.mean(values)) for key, values in found.items()})
+    return rows
+
+
+def large_rates(seeds: tuple[int, ...]) -> list[Row]:
+    """Rates of large steps, by `measure` of a disc: their errors and stated ones as shares of the truth, root mean
+    squares over fine texture and waves in 8 bits."""
+    rows: list[Row] = []
+    for name, (matrix, quantity, true) in RATES.items():
+        found: dict[str, list[float]] = {}
+        for seed in seeds:
+            for picture in (steps.texture(seed), steps.waves(seed)):
+                frames = [np.rint(steps.moved(picture, np.linalg.matrix_power(matrix, k))) for k in (-1, 0, 1)]
+                before, first, second = (np.clip(frame, 0, 255).astype(np.uint8) for frame in frames)
+                for what, field in (("pair", jacoflow.flow(first, second)), ("triple", jacoflow.flow(before, first, second))):
+                    measured = field.measure(quantity, (*steps.CENTRE, 45.0))
+                    if np.isfinite(measured.value):
+                        found.setdefault(f"{what}, error", []).append(measured.value / true - 1)
+                        found.setdefault(f"{what}, std", []).append(measured.std / true)
+        rows.append({"step": name} | {key: _rms(values) for key, values in found.items()})
+    return rows
+
+
+def unrelated(seeds: tuple[int, ...]) -> list[Row]:
+    """Shares of the sites that are `valid` between frames of independent noise of a pixel, of noise that moves too far,
+    and of moving texture in noise as strong as itself and stronger."""
+    rows: list[Row] = []
+    for name, (ratio, shift) in {
+        "independent noise": (None, 0), "noise of a pixel, 64 px": (0.0, 64), "texture, noise as strong": (1.0, 2),
+        "texture, noise twice as strong": (2.0, 2),
+    }.items():
+        row: Row = {"frames": name}
+        for what, count in (("pair", 2), ("triple", 3)):
+            shares = []
+            for seed in seeds:
+                rng = np.random.default_rng(seed)
+                if not ratio:
+                    picture = rng.integers(0, 256, (steps.SIZE, 2 * steps.SIZE)).astype(np.uint8)
+                    frames = [picture[:, (2 - k) * shift :][:, : steps.SIZE] for k in range(count)]
+                    if ratio is None:
+                        frames = [rng.integers(0, 256, (steps.SIZE, steps.SIZE)).astype(np.uint8) for _ in range(count)]
+                else:
+                    picture = steps.texture(seed)
+                    frames = [
+                        frame + rng.normal(0.0, ratio * frame.std(), frame.shape)
+                        for frame in (steps.moved(picture, np.eye(2), (float(k * shift), 0.0)) for k in range(count))
+                    ]
+                shares.append(float(jacoflow.flow(*frames).valid.mean()))
+            row[what] = float(np.mean(shares))
+        rows.append(row)
     return rows
 
 
@@ -193,6 +248,8 @@ def _rms(values: list[float]) -> float:
 
 TABLES = {
     "limits": report.Table("Limits of a step", lambda o: limits(SEEDS[: 1 if o.quick else len(SEEDS)])),
+    "large_rates": report.Table("Rates of large steps", lambda o: large_rates(SEEDS[: 1 if o.quick else len(SEEDS)])),
+    "unrelated": report.Table("Unrelated frames", lambda o: unrelated(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "turning_waves": report.Table("Turning waves", lambda o: turning_waves(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "two_motions": report.Table("Two motions in a region", lambda o: two_motions(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "turning_discs": report.Table("Turning discs", lambda o: turning_discs(SEEDS[: 1 if o.quick else len(SEEDS)])),

@@ -3,7 +3,7 @@
 mod consistency;
 
 use super::covariance::{CovarianceMap, CovarianceMaps, Energy, covariance};
-use super::data_term::{DataOptions, ENERGY, MOTION, UU, UV, VV, View};
+use super::data_term::{DataOptions, ENERGY, MOTION, SEEN, UU, UV, VV, View};
 use super::estimate::Estimate;
 use super::plane_pool::PlanePool;
 use super::planes::{Planes, SITE_SPACING};
@@ -20,6 +20,7 @@ use crate::parallel;
 use crate::simd::{Kernel, Lanes, Level, SimdReal, dispatch};
 use crate::types::{FlowField, Frame, Mask, SamplingGrid, Status};
 use consistency::Consistency;
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// Sum of the squared weights of a data term's rows: one of brightness, two of its gradient.
@@ -27,16 +28,20 @@ fn rows() -> f64 {
     1.0 + 2.0 * DataOptions::default().gradient.powi(2)
 }
 
+/// Residual energy of white noise of variance 1 in the frames, as they are compared.
+fn noise_energy<T>(estimate: &Estimate<T>, frames: &[&Frame<T>]) -> f64 {
+    // In each row: half its variance in a pair's difference, an eighth in a triple's.
+    let share = if frames.len() == 2 { 0.5 } else { 0.125 };
+    share * rows() * halved_noise().powi(estimate.level as i32)
+}
+
 pub(super) fn covariance_of<T: SimdReal>(
     estimate: &Estimate<T>,
     frames: &[&Frame<T>],
     common: &EstimatorOptions,
 ) -> CovarianceMaps<T> {
-    // White noise in each row: half its variance in a pair's difference, an eighth in a triple's.
-    let share = if frames.len() == 2 { 0.5 } else { 0.125 };
-    let halving_gain = halved_noise().powi(estimate.level as i32);
     let energy_of = |variance: f64| {
-        share * rows() * halving_gain * variance * estimate.noise_gain * estimate.brightness.gain.powi(2)
+        noise_energy(estimate, frames) * variance * estimate.noise_gain * estimate.brightness.gain.powi(2)
     };
     let noise = match common.noise {
         Some(sigma) => Energy::Known(energy_of(sigma * sigma)),
@@ -105,15 +110,43 @@ fn at_full_resolution<T: SimdReal>(
     motion
 }
 
-/// Status of every pixel, if frames say nothing: one without finite samples, or a constant image.
+/// Status of every pixel, if frames say nothing: one without finite samples, a constant image, or frames that
+/// have nothing in common.
 fn status_of_all<T: SimdReal>(estimate: &Estimate<T>, frames: &[&Frame<T>]) -> Option<Status> {
     let (data, threshold) = (&estimate.data, 1e-9 * estimate.brightness.contrast.powi(2));
     let mut information = (0..data.height).flat_map(|y| data.line(UU, y).iter().chain(data.line(VV, y)));
     if information.any(|v| v.to_f64() > threshold) {
-        return None;
+        return are_unrelated(estimate, frames).then_some(Status::Inconsistent);
     }
     let has_finite = |frame: &&Frame<T>| (0..frame.height()).any(|y| frame.row(y).iter().any(|value| value.finite()));
     Some(if frames.iter().all(has_finite) { Status::Unobservable } else { Status::NonFinite })
+}
+
+/// Minimum residual energy of unrelated frames, over that of white noise of their variance: motion fitted to
+/// noise takes a third of its energy.
+const MIN_UNRELATED_ENERGY: f64 = 0.6;
+
+/// Whether frames differ as independent noise does. Texture as fine as a pixel has so much information that
+/// single sites do not show it; coarser levels have none so fine.
+fn are_unrelated<T: SimdReal>(estimate: &Estimate<T>, frames: &[&Frame<T>]) -> bool {
+    if estimate.level > 0 || !keeps("flow.unrelated_frames") {
+        return false;
+    }
+    let (data, brightness) = (&estimate.data, &estimate.brightness);
+    let lines = || (0..data.height).step_by(SITES_PER_NODE);
+    let sum = |k: usize| lines().flat_map(|y| data.line(k, y)).map(|value| value.to_f64()).sum::<f64>();
+    let energy = sum(ENERGY) / (MIN_UNRELATED_ENERGY * noise_energy(estimate, frames) * sum(SEEN));
+    // The contrast leaves the extremes out, so that most frames need no other.
+    energy > brightness.contrast.powi(2)
+        && energy > brightness.gain.powi(2) * frames.iter().map(|frame| variance(frame)).fold(0.0, f64::max)
+}
+
+/// Variance of the finite samples of a frame.
+fn variance<T: SimdReal>(frame: &Frame<T>) -> f64 {
+    let samples = || frame.data().iter().map(|value| value.to_f64()).filter(|value| value.is_finite());
+    let count = samples().count().max(1) as f64;
+    let mean = samples().sum::<f64>() / count;
+    samples().map(|value| (value - mean).powi(2)).sum::<f64>() / count
 }
 
 struct Writer<'a, T: Clone> {
@@ -167,13 +200,17 @@ impl<T: SimdReal> Writer<'_, T> {
     /// Moves the flow at `places` of a band, which are pixels of row `y`, and widens its covariance by that.
     fn move_row(&self, band: &mut FieldBand<'_, T>, (y, (first, step)): (usize, (usize, usize)), places: Range<usize>) {
         let Some(pixels) = self.pixels else { return };
-        let moves = [0, 1].map(|k| &pixels.moves.line(k, y)[first..]);
-        for (flow, moves) in band.motion.iter_mut().zip(moves) {
-            flow[places.clone()].iter_mut().zip(moves.iter().step_by(step)).for_each(|(flow, &by)| *flow += by);
+        let moves = [0, 1].map(|k| {
+            let line = &pixels.moves.line(k, y)[first..];
+            // A slice where every pixel is a site, so that the compiler uses lanes.
+            if step == 1 { Cow::from(line) } else { line.iter().copied().step_by(step).collect() }
+        });
+        for (flow, moves) in band.motion.iter_mut().zip(&moves) {
+            flow[places.clone()].iter_mut().zip(&**moves).for_each(|(flow, &by)| *flow += by);
         }
         for (_, planes) in self.spreads(band).filter(|_| keeps("flow.refinement_error")) {
             for (i, j) in [(0, 0), (0, 1), (1, 1)] {
-                let products = moves[i].iter().zip(moves[j]).map(|(&a, &b)| a * b).step_by(step);
+                let products = moves[i].iter().zip(&*moves[j]).map(|(&a, &b)| a * b);
                 planes[upper(i, j)][places.clone()].iter_mut().zip(products).for_each(|(entry, by)| *entry += by);
             }
         }
