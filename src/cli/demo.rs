@@ -1,7 +1,7 @@
 //! `jacoflow demo`: the main job on an embedded scene, with the error against its exact truth.
 
 use super::arguments::{ComputeArguments, MessageArguments};
-use super::interrupt::Watch;
+use super::interrupt::{Watch, start_work};
 use super::open::compute;
 use super::report::{Report, print};
 use super::run::{ReportContext, report, run_pipeline};
@@ -83,6 +83,7 @@ impl DemoCommand {
             ..EstimatorOptions::default()
         };
         let estimator = Estimator::new(Method::Windowed(options), common)?;
+        start_work();
         let frames = self.write_frames(&*scene, threads, replace, watch)?;
         let kept = Collect::<f32>::default();
         let fields = kept.handle();

@@ -1,6 +1,7 @@
 //! From input arguments to a source, and what is known about it before the run.
 
 use super::arguments::{ComputeArguments, InputArguments, UnitArguments};
+use super::interrupt::start_work;
 use crate::error::{Error, Result};
 use crate::flow::InitialFlow;
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};
@@ -70,6 +71,7 @@ fn looked_at<F: FrameFormat>(source: Box<dyn FrameSource<F>>, arguments: &InputA
     let has_own_rate = arguments.fps.is_none() && rate.is_some();
     let (first, source) = peek(source)?;
     let first = first.ok_or_else(|| Error::argument("input", "at least one frame", format!("none in {name}")))?;
+    start_work();
     Ok(Opened { source, first, frames, numbering, has_own_rate, pixel_size, name })
 }
 

@@ -1,6 +1,6 @@
 //! The bar on the terminal, and the question whether to stop.
 
-use super::interrupt::Watch;
+use super::interrupt::{Watch, start_work};
 use crate::error::Result;
 use crate::parallel::Progress;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -15,8 +15,9 @@ pub struct Bar<'a> {
 }
 
 impl<'a> Bar<'a> {
-    /// A bar for work called `name`; hidden when `quiet` or not on a terminal.
+    /// A bar for work called `name`, which starts; hidden when `quiet` or not on a terminal.
     pub fn new(watch: &'a Watch, name: &'static str, quiet: bool) -> Self {
+        start_work();
         let shown = !quiet && std::io::stderr().is_terminal();
         let bar = if shown {
             ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10)).with_message(name)

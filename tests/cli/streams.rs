@@ -190,6 +190,42 @@ fn a_second_interrupt_ends_at_once_and_leaves_no_temporary_file() {
     }
 }
 
+/// Waits until the process handles signals itself; SIGTERM is the last that it does.
+#[cfg(target_os = "linux")]
+fn wait_for_handlers(child: &Child) {
+    wait_until("signal handlers", || {
+        let text = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+        let caught = text.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+        caught.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).unwrap() >> 14 & 1 == 1)
+    });
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_first_interrupt_ends_the_opening_of_a_silent_pipe() {
+    for line in [
+        "info pipe.y4m",
+        "flow pipe.y4m -o out",
+        "measure pipe.y4m --quantity u -o out.csv",
+        "filter pipe.y4m -o out",
+        "track pipe.y4m --box 5,5,9,9 -o out.csv",
+        "track pipe.y4m pipe.y4m --method stereo -o out.csv",
+        "stereo pipe.y4m pipe.y4m -o out",
+        "egomotion pipe.y4m --intrinsics 60,60,32,24 -o out.csv",
+        "flow - -o out",
+        "info -",
+    ] {
+        let place = Place::new();
+        assert!(std::process::Command::new("mkfifo").arg(place.path("pipe.y4m")).status().unwrap().success());
+        let mut child = start(&place, line);
+        wait_for_handlers(&child);
+        interrupt(&child);
+        wait_until(line, || child.try_wait().unwrap().is_some());
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{line}");
+        assert_eq!(place.names("."), ["pipe.y4m"], "{line}");
+    }
+}
+
 #[test]
 fn rows_on_standard_output_come_frame_by_frame_and_a_closed_pipe_ends_quietly() {
     // Few rows a frame, which are flushed; and more than any buffer holds.

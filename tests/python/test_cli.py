@@ -1,12 +1,17 @@
 """The command line through Python: `python -m jacoflow` and the console script."""
 
 import json
+import os
+import re
 import shlex
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import jacoflow
 
@@ -98,6 +103,20 @@ def test_a_damaged_state_is_described_in_either_precision(tmp_path):
             assert result.returncode == 1 and words in result.stderr, result.stderr
             assert "expected a state in" not in result.stderr
             assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/status"), reason="the system does not show a process's signals")
+def test_the_first_interrupt_ends_the_opening_of_a_pipe(tmp_path):
+    os.mkfifo(tmp_path / "pipe.y4m")
+    process = subprocess.Popen([sys.executable, "-m", "jacoflow", "info", "pipe.y4m"], cwd=tmp_path)
+    # Python itself does not catch SIGTERM, the command line does.
+    caught = 0
+    while not caught >> (signal.SIGTERM - 1) & 1:
+        assert process.poll() is None
+        caught = int(re.search(r"SigCgt:\s*(\w+)", Path(f"/proc/{process.pid}/status").read_text())[1], 16)
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    assert process.wait(timeout=60) == 130
 
 
 def test_a_closed_standard_output_is_an_error(tmp_path):
