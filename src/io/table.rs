@@ -119,7 +119,8 @@ macro_rules! table_endings {
 }
 pub(in crate::io) use table_endings;
 
-/// One row a site: frame, x, y, status, parameters, and standard deviations if there is covariance.
+/// One row a site: frame, time_s (empty where it is not known), x, y, status, parameters, and standard
+/// deviations if there is covariance.
 #[derive(Debug)]
 pub struct FieldTable {
     table: TableWriter,
@@ -130,7 +131,7 @@ pub struct FieldTable {
 impl FieldTable {
     /// Begins a table for fields of this layout.
     pub fn create(path: impl AsRef<Path>, layout: &FieldLayout, covariance: bool) -> Result<Self> {
-        let mut header: Vec<String> = ["frame", "x", "y", "status"].map(String::from).to_vec();
+        let mut header: Vec<String> = ["frame", "time_s", "x", "y", "status"].map(String::from).to_vec();
         header.extend(layout.parameters.iter().cloned());
         if covariance {
             header.extend(layout.parameters.iter().map(|p| format!("std_{p}")));
@@ -138,12 +139,12 @@ impl FieldTable {
         Ok(Self { table: TableWriter::create(path, &header)?, covariance, parameters: layout.parameters.len() })
     }
 
-    /// Adds the sites of a field, in their order.
+    /// Adds the sites of a field, in their order; `time`: that of its frame, s.
     ///
     /// # Errors
     /// [`Error::Argument`] when the field has other columns than the table; [`Error::Io`] when the rows
     /// cannot be written.
-    pub fn write<T: Real>(&mut self, field: &FlowField<T>) -> Result<()> {
+    pub fn write<T: Real>(&mut self, field: &FlowField<T>, time: Option<f64>) -> Result<()> {
         let (n, p) = (field.len(), field.layout.parameters.len());
         if p != self.parameters || field.covariance.is_some() != self.covariance {
             return Err(Error::argument(
@@ -153,11 +154,13 @@ impl FieldTable {
             ));
         }
         let frame = field.layout.frame_index.to_string();
+        let time = time.map(cell).unwrap_or_default();
         let mut cells: Vec<String> = Vec::new();
         for i in 0..n {
             let (x, y) = field.layout.sites.pixel(i % field.width, i / field.width);
             cells.clear();
-            cells.extend([frame.clone(), x.to_string(), y.to_string(), field.status[i].name().to_string()]);
+            let status = field.status[i].name().to_string();
+            cells.extend([frame.clone(), time.clone(), x.to_string(), y.to_string(), status]);
             cells.extend((0..p).map(|k| cell(field.motion[k * n + i])));
             if let Some(covariance) = &field.covariance {
                 // Plane of the variance (k, k) in the upper triangle, row by row.

@@ -72,10 +72,25 @@ fn points_and_regions_agree_with_the_whole() {
     let (row, col) = (5, 5);
     assert_eq!(part.affine(row * 11 + col), whole.affine((10 + 2 * row) * 64 + 20 + 2 * col));
     let lines: Vec<&str> = points.out.lines().collect();
-    assert!(lines[0].starts_with("frame,x,y,status,u,v") && lines[0].contains("std_u"));
+    assert!(lines[0].starts_with("frame,time_s,x,y,status,u,v") && lines[0].contains("std_u"));
     let cells: Vec<&str> = lines[1].split(',').collect();
-    assert_eq!(cells[..4], ["1", "30", "20", "ok"]);
-    assert_eq!(cells[4].parse::<f64>().unwrap(), whole.affine(20 * 64 + 30).u);
+    assert_eq!(cells[..5], ["1", "", "30", "20", "ok"]);
+    assert_eq!(cells[5].parse::<f64>().unwrap(), whole.affine(20 * 64 + 30).u);
+}
+
+#[test]
+fn rows_of_fields_have_the_time_of_their_frame() {
+    let place = Place::new();
+    place.good("synth affine -o s.y4m --frames 6 --size 40x32 --rate 25");
+    place.good("synth affine -o s.npy --frames 6 --size 40x32");
+    let times = |line: &str| -> Vec<String> {
+        let rows = place.good(line).out;
+        rows.lines().skip(1).map(|row| row.split(',').take(2).collect::<Vec<_>>().join(" ")).collect()
+    };
+    assert_eq!(times("flow s.y4m --points 20,20 --start 1"), ["2 0.08", "3 0.12", "4 0.16"]);
+    assert_eq!(times("flow s.y4m --points 20,20 --fps 10 --stop 3"), ["1 0.1"]);
+    assert_eq!(times("filter s.y4m --points 20,20 --stop 2"), ["0 0", "1 0.04"]);
+    assert_eq!(times("filter s.npy --points 20,20 --stop 1"), ["0 "]);
 }
 
 #[test]

@@ -229,8 +229,8 @@ fn the_first_interrupt_ends_the_opening_of_a_silent_pipe() {
 #[test]
 fn rows_on_standard_output_come_frame_by_frame_and_a_closed_pipe_ends_quietly() {
     // Few rows a frame, which are flushed; and more than any buffer holds.
-    follow("flow - --points 20,20 --quiet", "1,20,20,ok");
-    follow("flow - -o - --quiet", "1,0,0,ok");
+    follow("flow - --points 20,20 --quiet", "1,0.04,20,20,ok");
+    follow("flow - -o - --quiet", "1,0.04,0,0,ok");
 }
 
 fn follow(command: &str, first: &str) {
@@ -243,7 +243,7 @@ fn follow(command: &str, first: &str) {
     let mut rows = BufReader::new(child.stdout.take().unwrap());
     let mut line = String::new();
     rows.read_line(&mut line).unwrap();
-    assert!(line.starts_with("frame,x,y,status"));
+    assert!(line.starts_with("frame,time_s,x,y,status"));
     line.clear();
     // The first row is there although the input is not at its end.
     rows.read_line(&mut line).unwrap();

@@ -33,19 +33,21 @@ fn a_field_gives_a_row_a_site() {
     field.status[1] = Status::Unobservable;
     field.motion[1] = f32::NAN;
     let mut table = FieldTable::create(&path, &field.layout, true).unwrap();
-    table.write(&field).unwrap();
+    table.write(&field, Some(0.125)).unwrap();
+    table.write(&field, None).unwrap();
     field.covariance = None;
-    assert!(table.write(&field).unwrap_err().to_string().starts_with("field"));
+    assert!(table.write(&field, None).unwrap_err().to_string().starts_with("field"));
     table.finish().unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let lines: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect()).collect();
-    assert_eq!(lines.len(), 3);
-    assert_eq!(lines[0][..6], ["frame", "x", "y", "status", "u", "v"]);
-    assert_eq!(lines[0][10..12], ["std_u", "std_v"]);
-    assert_eq!(lines[1][..6], ["3", "6", "4", "ok", "0", "2"]);
-    assert_eq!(lines[2][..5], ["3", "1", "2", "unobservable", "nan"]);
+    assert_eq!(lines.len(), 5);
+    assert_eq!(lines[0][..7], ["frame", "time_s", "x", "y", "status", "u", "v"]);
+    assert_eq!(lines[0][11..13], ["std_u", "std_v"]);
+    assert_eq!(lines[1][..7], ["3", "0.125", "6", "4", "ok", "0", "2"]);
+    assert_eq!(lines[2][..6], ["3", "0.125", "1", "2", "unobservable", "nan"]);
+    assert_eq!(lines[3][..3], ["3", "", "6"]);
     // Variances are planes 0, 6, 11, 15, 18, 20 of the triangle; plane k at site 0 holds k.
-    for (column, plane) in [(10, 0.0f64), (11, 6.0), (12, 11.0), (13, 15.0), (14, 18.0), (15, 20.0)] {
+    for (column, plane) in [(11, 0.0f64), (12, 6.0), (13, 11.0), (14, 15.0), (15, 18.0), (16, 20.0)] {
         assert!((lines[1][column].parse::<f64>().unwrap() - plane.sqrt()).abs() < 1e-12);
     }
 }

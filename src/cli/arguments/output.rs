@@ -15,7 +15,8 @@ pub struct OutputArguments {
     /// all that is saved. A new folder with a dot in its name needs a / at its end
     #[arg(long, short, value_name = "OUT")]
     pub output: Option<PathBuf>,
-    /// Formats in a folder: npz (everything), flo, kitti (PNG), pfm, csv [default: npz]
+    /// Formats in a folder: npz (everything), flo, kitti (PNG), pfm, csv (a row a site: frame, time_s where
+    /// it is known, x, y, status, parameters, their standard deviations) [default: npz]
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub format: Vec<String>,
     /// Pictures (PNG): colour, quiver, divergence, curl

@@ -141,7 +141,7 @@ impl<T: Real> Sink<Step<'_, T>> for Rows {
             Some(table) => table,
             empty => empty.insert(FieldTable::create(self.target.path(), &field.layout, field.covariance.is_some())?),
         };
-        table.write(field)?;
+        table.write(field, step.time)?;
         if self.target == TableTarget::StandardOutput { table.flush() } else { Ok(()) }
     }
 
