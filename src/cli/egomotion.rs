@@ -5,7 +5,7 @@ use super::arguments::{
 };
 use super::flow::{Prepared, prepare_with_covariance};
 use super::interrupt::Watch;
-use super::open::{compute, open_input};
+use super::open::{compute, open_for_method};
 use super::paths::CommandPaths;
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow, table_target};
@@ -104,7 +104,7 @@ impl EgomotionCommand {
             .writing_numbered("maps", self.maps.as_deref(), "contact", &["npz"])
             .check(self.force)?;
         let plan = self.plan()?;
-        let mut opened = open_input(&self.input)?;
+        let mut opened = open_for_method(&self.input, &self.method)?;
         let Prepared { plan: stream, is_double, .. } = prepare_with_covariance(
             &mut opened,
             &self.input,

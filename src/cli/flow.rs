@@ -4,7 +4,7 @@ use super::arguments::{
     ComputeArguments, GridArguments, InputArguments, MessageArguments, MethodArguments, OutputArguments,
 };
 use super::interrupt::Watch;
-use super::open::{Opened, compute, open_input, preprocess, read_initial, read_mask};
+use super::open::{Opened, compute, open_for_method, preprocess, read_initial, read_mask};
 use super::paths::CommandPaths;
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow};
@@ -182,7 +182,7 @@ impl FlowCommand {
         let paths = CommandPaths::of_input(&self.input.input).reading(files);
         let paths = with_output(paths, &self.output, !self.grid.points.is_empty())?;
         let _new_folders = paths.check(self.output.force)?;
-        let mut opened = open_input(&self.input)?;
+        let mut opened = open_for_method(&self.input, &self.method)?;
         let Prepared { plan: stream, is_double, description } =
             prepare(&mut opened, &self.input, &self.method, &self.grid, &self.compute)?;
         let estimator = stream.estimator();

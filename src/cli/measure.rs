@@ -3,7 +3,7 @@
 use super::arguments::{ComputeArguments, GridArguments, InputArguments, MessageArguments, MethodArguments};
 use super::flow::{Prepared, prepare_with_covariance};
 use super::interrupt::Watch;
-use super::open::open_input;
+use super::open::open_for_method;
 use super::paths::CommandPaths;
 use super::report::Report;
 use super::run::{ReportContext, input_details, run_flow, table_target};
@@ -70,7 +70,7 @@ impl MeasureCommand {
         let paths = CommandPaths::of_input(&self.input.input).reading(files);
         let _new_folders = paths.writing("output", self.output.as_deref()).check(self.force)?;
         let target = table_target(self.output.as_deref(), self.force, self.messages.json)?;
-        let mut opened = open_input(&self.input)?;
+        let mut opened = open_for_method(&self.input, &self.method)?;
         if let Some(quantity) = quantities.iter().find(|q| q.needs_fps() && opened.numbering.rate.is_none()) {
             let expected = format!("frames per second, for {}", quantity.name());
             return Err(Error::argument("fps", expected, "none, and the input does not say"));

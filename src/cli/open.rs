@@ -1,13 +1,13 @@
 //! From input arguments to a source, and what is known about it before the run.
 
-use super::arguments::{ComputeArguments, InputArguments, UnitArguments};
+use super::arguments::{ComputeArguments, InputArguments, MethodArguments, UnitArguments};
 use super::interrupt::start_work;
 use crate::error::{Error, Result};
 use crate::flow::InitialFlow;
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};
 use crate::io::{
-    ChannelPolicy, Colour, FilesSource, FrameFormat, FrameSource, OpenOptions, PixelSize, Selected, kind_of, open,
-    open_colour, read_flo, read_image, read_kitti,
+    ChannelPolicy, Colour, DoubleFrames, FilesSource, FrameFormat, FrameSource, OpenOptions, PixelSize, Selected,
+    kind_of, open, open_colour, read_flo, read_image, read_kitti,
 };
 use crate::parallel::Threads;
 use crate::pipeline::{FirstFrame, Numbering, peek};
@@ -53,6 +53,19 @@ pub fn open_input(arguments: &InputArguments) -> Result<Opened> {
     looked_at(open_source(&arguments.input, &arguments.selection.options())?, arguments)
 }
 
+/// As [`open_input`], of frames for a method: two inputs of pairs give the first and the second frames.
+pub fn open_for_method(arguments: &InputArguments, method: &MethodArguments) -> Result<Opened> {
+    match &arguments.input[..] {
+        [first, second] if method.pairs => {
+            let selection = arguments.selection.options();
+            let whole = OpenOptions { start: 0, stop: None, step: 1, ..selection };
+            let both = DoubleFrames::new(open(first, &whole)?, open(second, &whole)?)?;
+            looked_at(Box::new(Selected::new(both, &selection)?), arguments)
+        }
+        _ => open_input(arguments),
+    }
+}
+
 /// As [`open_input`], of colour frames.
 pub fn open_colour_input(arguments: &InputArguments) -> Result<Opened<AnyColourFrame>> {
     let options = arguments.selection.options();
@@ -93,7 +106,10 @@ fn open_files<P: ChannelPolicy>(
         Path::new(path).is_dir() || matches!(kind_of(path), Some("y4m" | "npy" | "list" | "unreadable"))
     };
     if let Some(sequence) = many.iter().find(is_sequence) {
-        return Err(Error::argument("input", "image files only, when several inputs are given", sequence));
+        let got = format!(
+            "{sequence}; flow, measure and egomotion take two others as first and second frames of pairs, with --pairs"
+        );
+        return Err(Error::argument("input", "image files only, when several inputs are given", got));
     }
     let files = FilesSource::new(many.iter().map(PathBuf::from).collect(), policy)?.with_planes(options.planes);
     Ok(Box::new(Selected::new(files, options)?))

@@ -50,8 +50,8 @@ pub use picture_sequence::SequenceWriter;
 pub use planes::{PixelSize, PlaneSelection, Slices};
 pub use sink::{ColourSink, FrameSink, NpySink, PngSink, Y4mSink, check_sink, open_colour_sink, open_sink};
 pub use source::{
-    ColourSource, FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected, ViewLayout,
-    ViewPairs, Y4mSource, files_read, kind_of, open, open_colour,
+    ColourSource, DoubleFrames, FfmpegSource, FilesSource, FrameSource, MemorySource, NpySource, OpenOptions, Selected,
+    ViewLayout, ViewPairs, Y4mSource, files_read, kind_of, open, open_colour,
 };
 pub use table::{FieldTable, TableWriter, cell};
 pub use track_table::TrackTable;

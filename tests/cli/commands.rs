@@ -220,6 +220,48 @@ fn double_frames_give_a_field_a_pair() {
 }
 
 #[test]
+fn double_frames_may_lie_in_two_inputs() {
+    let place = Place::new();
+    place.good("synth affine -o s.npy --frames 8 --size 64x48 --set u=1.5 --set v=-0.5");
+    place.good("synth affine -o s --frames 8 --size 64x48 --set u=1.5 --set v=-0.5");
+    let whole = place.good("measure s.npy --pairs --quantity u,v").out;
+    for (folder, shift) in [("A", 0), ("B", 1)] {
+        fs::create_dir(place.path(folder)).unwrap();
+        for pair in 0..4 {
+            let frame = place.path(&format!("s/frame_{:06}.png", 2 * pair + shift));
+            fs::copy(frame, place.path(&format!("{folder}/{pair}.png"))).unwrap();
+        }
+        place.good(&format!("synth affine -o {folder}.npy --frames 8 --size 64x48"));
+        place.good(&format!("synth affine -o {folder}.y4m --frames 8 --size 64x48 --rate 15"));
+    }
+    // Frame n of the first input is followed by frame n of the second, in folders, patterns and single files.
+    let line = |input: &str| place.good(&format!("measure {input} --pairs --quantity u,v")).out;
+    assert_eq!(line("A B"), whole);
+    assert_eq!(line("A/*.png B/*.png"), whole);
+    assert_eq!(whole.lines().count(), 1 + 4 * 2);
+    let first: Vec<&str> = whole.lines().take(3).collect();
+    assert_eq!(line("A/0.png B/0.png").lines().collect::<Vec<_>>(), first);
+    let value: f64 = first[1].split(',').nth(5).unwrap().parse().unwrap();
+    assert!((value - 1.5).abs() < 0.05, "{}", first[1]);
+    // Two stacks; the frames are counted as if they lay in one.
+    place.good("flow A.npy B.npy --pairs --start 2 --stop 6 -o out");
+    assert_eq!(place.names("out"), ["000002.npz", "000004.npz"]);
+    // The rate of the files counts pairs, and says nothing of the time within them.
+    let rate = place.good("flow A.y4m B.y4m --pairs --json");
+    assert_eq!((&rate.json()["fps"], rate.json()["fields"].as_u64()), (&serde_json::Value::Null, Some(8)));
+    // Every other way of giving several inputs is the order given.
+    let ordered = line("A/0.png A/1.png B/0.png B/1.png");
+    assert!((ordered.lines().nth(1).unwrap().split(',').nth(5).unwrap().parse::<f64>().unwrap() - 3.0).abs() < 0.1);
+    fs::remove_file(place.path("B/3.png")).unwrap();
+    let fewer = place.line("measure A B --pairs --quantity u");
+    assert_eq!(fewer.code, 2);
+    assert!(fewer.err.contains("input: expected as many frames in both inputs"), "{}", fewer.err);
+    assert!(fewer.err.contains("got 4 in 4 images, A/0.png to A/3.png and 3 in 3 images"), "{}", fewer.err);
+    let without = place.line("measure A B --quantity u");
+    assert!(without.code == 2 && without.err.contains("with --pairs"), "{}", without.err);
+}
+
+#[test]
 fn fields_of_a_known_rate_and_pitch_are_in_those_units() {
     let place = Place::new();
     place.good("synth affine -o s.npy --frames 3 --size 48x40");

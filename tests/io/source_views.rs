@@ -1,6 +1,7 @@
 //! Two views of each moment: from two sources, or cut out of frames that hold both.
 
-use jacoflow::io::{FrameSource, MemorySource, ViewLayout, ViewPairs};
+use jacoflow::error::Result;
+use jacoflow::io::{DoubleFrames, FrameSource, MemorySource, ViewLayout, ViewPairs};
 use jacoflow::types::{AnyFrame, Frame};
 
 fn source(levels: &[u8]) -> Box<dyn FrameSource> {
@@ -24,6 +25,41 @@ fn pairs_come_in_step_and_the_first_view_is_the_left_one() {
     let mut uneven = ViewPairs::separate(source(&[10]), source(&[30, 40]));
     uneven.next_pair().unwrap();
     assert!(uneven.next_pair().unwrap_err().to_string().contains("fewer left than right"));
+}
+
+/// A source that does not know how many frames it has.
+struct Stream(Box<dyn FrameSource>);
+
+impl FrameSource for Stream {
+    fn next_frame(&mut self) -> Result<Option<AnyFrame>> {
+        self.0.next_frame()
+    }
+    fn describe(&self) -> String {
+        "stream".into()
+    }
+}
+
+#[test]
+fn double_frames_alternate_and_must_be_as_many() {
+    let stream = |levels: &[u8]| -> Box<dyn FrameSource> { Box::new(Stream(source(levels))) };
+    let read = |mut both: DoubleFrames| -> Result<Vec<f32>> {
+        let mut found = Vec::new();
+        while let Some(frame) = both.next_frame()? {
+            found.push(frame.to_real::<f32>().get(0, 0));
+        }
+        Ok(found)
+    };
+    for both in [[source(&[1, 2]), source(&[5, 6])], [stream(&[1, 2]), stream(&[5, 6])]] {
+        let [first, second] = both;
+        assert_eq!(read(DoubleFrames::new(first, second).unwrap()).unwrap(), [1.0, 5.0, 2.0, 6.0]);
+    }
+    let known = DoubleFrames::new(source(&[1, 2]), source(&[5])).err().unwrap().to_string();
+    assert!(known.contains("got 2 in 2 frames in memory and 1 in 1 frames in memory"), "{known}");
+    for (first, second) in [(3, 1), (1, 3), (2, 3)] {
+        let both = DoubleFrames::new(stream(&vec![1; first]), stream(&vec![5; second])).unwrap();
+        let words = read(both).unwrap_err().to_string();
+        assert!(words.contains(&format!("got {first} in stream and {second} in stream")), "{words}");
+    }
 }
 
 #[test]

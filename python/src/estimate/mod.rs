@@ -177,6 +177,7 @@ macro_rules! define_estimate {
         ///     three or more (T - 2, H, W), or (T - 1, H, W) with the time scheme "pair".
         /// pairs : bool
         ///     Frames of double-frame recordings, 0 and 1, 2 and 3, ...: T / 2 fields, none between pairs.
+        ///     Frames in two folders or stacks: `jacoflow.flow(a, b)` for each pair.
         /// method : "coarse_to_fine", "windowed", "instantaneous", "lucas_kanade", "horn_schunck", or options
         ///     A name means the method with its defaults; `CoarseToFine` (default), `Windowed`,
         ///     `Instantaneous`, `LucasKanade` and `HornSchunck` hold its options and say what it is for.

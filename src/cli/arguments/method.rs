@@ -67,7 +67,8 @@ pub struct MethodArguments {
     #[arg(long, value_name = "F")]
     pub forgetting: Option<f64>,
     /// The frames are pairs of a double-frame recording, 1 and 2, 3 and 4, ...: a field for each pair and
-    /// none between them
+    /// none between them. Of two inputs (A/ B/, a.tif b.tif) the first has the first frames of the pairs, the
+    /// second the second ones; more inputs (A/*.tif B/*.tif) are frames in the order given
     #[arg(long)]
     pub pairs: bool,
     /// Leave the covariance out: faster, smaller files

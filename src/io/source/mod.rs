@@ -1,5 +1,6 @@
 //! Where frames come from: one file for each kind of source and one line in [`KINDS`].
 
+mod double_frames;
 mod ffmpeg;
 mod files;
 mod glob;
@@ -11,6 +12,7 @@ mod unreadable;
 mod views;
 mod y4m;
 
+pub use double_frames::DoubleFrames;
 pub use ffmpeg::FfmpegSource;
 pub use files::FilesSource;
 pub use memory::MemorySource;
