@@ -732,14 +732,16 @@ def smooth(
     """`frame` (H, W) smoothed by a Gaussian of standard deviation `blur_sigma` px, cut off at `truncate`
     standard deviations, reflecting borders.
 
-    Returns a new array (H, W) in the same grey levels, float64 for float64, else float32. NaN damages only
-    the pixels whose kernel reaches it. ValueError for a negative or infinite `blur_sigma`.
+    Returns a new array (H, W) in the same grey levels, float64 for float64, else float32. NaN (as masked
+    pixels become) damages only the pixels whose kernel reaches it. ValueError for a negative or infinite
+    `blur_sigma`.
     """
 
 def quantise(frame: _Frame, step: float | None = None) -> _Floats:
     """`frame` (H, W) rounded down to multiples of `step` grey levels: floor(x / step) * step.
 
-    Returns a new array (H, W), float64 for float64, else float32. ValueError unless `step` is positive.
+    Returns a new array (H, W), float64 for float64, else float32, NaN for masked pixels. ValueError unless
+    `step` is positive.
     """
 
 def luminance(frame: _Frame) -> NDArray[Any]:
@@ -768,8 +770,8 @@ def corners(
     neighbours. It is at least `min_distance` px away from every better corner and from every point of
     `existing` (N, 2). At most `max_count` corners, `existing` not counted.
 
-    Returns positions (x, y) px, float64 (N, 2), best first. There are no corners where a window touches NaN.
-    ValueError for a number out of its range and for a colour frame.
+    Returns positions (x, y) px, float64 (N, 2), best first. There are no corners where a window touches NaN
+    or a masked pixel. ValueError for a number out of its range and for a colour frame.
     """
 
 def point_flow(
@@ -795,10 +797,10 @@ def point_flow(
     px. `guesses` (N, 2): expected flow, default zero.
 
     `ok` is False unless the flow back from the new position leads to within `forward_backward` px of the
-    point (None: not tested). A point is lost (NaN) when it leaves the frame, when its window touches NaN, or
-    when the window has too little structure: smaller eigenvalue of its mean structure tensor below
-    `min_eigenvalue`, (levels/px)^2. None: 0.1 where the first frame spans 255 levels, scaled by the square of
-    its span.
+    point (None: not tested). A point is lost (NaN) when it leaves the frame, when its window touches NaN or
+    a masked pixel, or when the window has too little structure: smaller eigenvalue of its mean structure
+    tensor below `min_eigenvalue`, (levels/px)^2. None: 0.1 where the first frame spans 255 levels, scaled by
+    the square of its span.
 
     Returns flow (u, v) px/frame, float64 (N, 2); ok, bool (N,); error, the distance between forward and back,
     px, float64 (N,). ValueError for a number out of its range, for frames of different shape and for colour

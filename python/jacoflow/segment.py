@@ -44,8 +44,8 @@ def felzenszwalb(
     ----------
     image : array (H, W) or (H, W, 3) of uint8, uint16, float32 or float64
         White is 255, 65535 or 1. Floats beyond 1 are taken as they are: the unit of `scale` does not change.
-        float64 is computed in double precision, everything else in single precision. Pixels that are not
-        finite are left out of the smoothing; their edges merge nothing but regions smaller than `min_size`,
+        float64 is computed in double precision, everything else in single precision. Pixels that are
+        masked or not finite are left out of the smoothing; their edges merge nothing but regions smaller than `min_size`,
         after all other edges.
     scale : levels of 255, times px
         The paper's `k`: the larger, the larger the regions. At least 0. Same unit as in scikit-image's
@@ -82,7 +82,7 @@ def region_means(labels: ArrayLike, values: ArrayLike) -> NDArray[np.float64]:
     labels : array (H, W) of integers
         Region of every pixel, as `felzenszwalb` returns it: 0 to n - 1, n being one more than the largest.
     values : array (H, W) or (H, W, C) of real numbers or booleans
-        In any unit. NaN is left out of the mean, channel by channel.
+        In any unit. NaN, or what is masked, is left out of the mean, channel by channel.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def region_means(labels: ArrayLike, values: ArrayLike) -> NDArray[np.float64]:
     check_memory("labels", 8 * regions.size)
     if regions.size and regions.dtype.kind == "u" and int(regions.max()) > np.iinfo(np.int64).max:
         raise ValueError(f"labels: expected 0 to {1 << 27}, got {regions.max()}")
-    numbers = np.asarray(values)
+    numbers = np.ma.filled(values.astype(np.float64), np.nan) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
     if numbers.dtype.kind == "b":
         numbers = numbers.view(np.uint8)
     return _region_means(np.ascontiguousarray(regions, np.int64), numbers)

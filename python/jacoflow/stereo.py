@@ -70,7 +70,7 @@ def edge_disparity(
     ----------
     left, right : arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64
         Two views of one size, at least 17 x 17 px. Brightness is taken on the scale 0 to 255: uint16 is divided by 257, floats are taken for shares of white unless at least half of what is not dark (above 0.1) exceeds 1.5; hot patches decide nothing. Colour is turned into
-        luminance. A sample that is not finite leaves no edge pixel where the gradient's kernel reaches it, and harms no other.
+        luminance. A sample that is masked or not finite leaves no edge pixel where the gradient's kernel reaches it, and harms no other.
     disparity_range : (least, greatest), whole px, both included
         Candidates, at most 1024. Those that leave the right view are not admissible.
     row_range : (least, greatest), rows, both included
@@ -101,7 +101,7 @@ def edge_disparity(
     Returns
     -------
     EdgeDisparity
-        Empty, not an error, where there are no edges.
+        Empty, not an error, where there are no edges, as in a view of NaN.
 
     ValueError names an argument that is out of range or views that do not fit, with both shapes. A UserWarning says where views with edges disagree at every row offset in `row_range`: cameras that are farther
     apart in height, or views that do not belong together. What is then found is mostly wrong.

@@ -137,8 +137,8 @@ pub fn tracked_frame(
     converted(argument, unmasked(argument, object, levels)?, colour)
 }
 
-/// The array with NaN for masked samples; uint8 and uint16 then become float32 with the white that `levels`
-/// take floats to have.
+/// The array, masked or not; masked bool, uint8 and uint16 become float32 with the white that `levels` take
+/// floats to have.
 pub fn unmasked<'py>(
     argument: &str,
     object: &Bound<'py, PyAny>,
@@ -146,7 +146,7 @@ pub fn unmasked<'py>(
 ) -> Outcome<Bound<'py, PyUntypedArray>> {
     let array = native(argument, object)?;
     let white = match dtype_name(&array).as_str() {
-        "uint8" => f32::from(u8::MAX),
+        "bool" | "uint8" => f32::from(u8::MAX),
         "uint16" => f32::from(u16::MAX),
         _ => return Ok(array),
     };
@@ -154,8 +154,9 @@ pub fn unmasked<'py>(
         return Ok(array);
     }
     let white_of_floats = f32::from(u8::MAX) / levels.float_gain() as f32;
-    let scaled = array.call_method1("astype", ("float32",))?.mul(white_of_floats / white)?;
-    Ok(scaled.cast_into::<PyUntypedArray>()?)
+    // Masked arrays take a divisor for float64.
+    let scaled = array.call_method1("astype", ("float32",))?.div(white / white_of_floats)?;
+    Ok(scaled.call_method1("astype", ("float32",))?.cast_into::<PyUntypedArray>()?)
 }
 
 fn converted(argument: &str, array: Bound<'_, PyUntypedArray>, colour: ColourRule) -> Outcome<AnyFrame> {

@@ -25,8 +25,9 @@ macro_rules! in_precision {
 /// `frame` (H, W) smoothed by a Gaussian of standard deviation `blur_sigma` px, cut off at `truncate`
 /// standard deviations, reflecting borders.
 ///
-/// Returns a new array (H, W) in the same grey levels, float64 for float64, else float32. NaN damages only
-/// the pixels whose kernel reaches it. ValueError for a negative or infinite `blur_sigma`.
+/// Returns a new array (H, W) in the same grey levels, float64 for float64, else float32. NaN (as masked
+/// pixels become) damages only the pixels whose kernel reaches it. ValueError for a negative or infinite
+/// `blur_sigma`.
 #[pyfunction]
 #[pyo3(signature = (frame, blur_sigma, *, truncate=None, threads=None))]
 pub fn smooth<'py>(
@@ -36,7 +37,7 @@ pub fn smooth<'py>(
     #[pyo3(from_py_with = named::threads)] threads: Option<Integer>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let py = frame.py();
-    let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
+    let frame = arrays::frame_with_gaps("frame", frame, ColourRule::Refuse)?;
     let smoother = match truncate {
         None => GaussianSmoother::new(blur_sigma),
         Some(truncate) => GaussianSmoother::with(blur_sigma, truncate, Border::Reflect),
@@ -49,7 +50,8 @@ pub fn smooth<'py>(
 
 /// `frame` (H, W) rounded down to multiples of `step` grey levels: floor(x / step) * step.
 ///
-/// Returns a new array (H, W), float64 for float64, else float32. ValueError unless `step` is positive.
+/// Returns a new array (H, W), float64 for float64, else float32, NaN for masked pixels. ValueError unless
+/// `step` is positive.
 #[pyfunction]
 #[pyo3(signature = (frame, step=None))]
 pub fn quantise<'py>(
@@ -57,7 +59,7 @@ pub fn quantise<'py>(
     #[pyo3(from_py_with = named::step)] step: Option<f64>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let py = frame.py();
-    let frame = arrays::frame("frame", frame, ColourRule::Refuse)?;
+    let frame = arrays::frame_with_gaps("frame", frame, ColourRule::Refuse)?;
     let quantiser =
         step.map_or(Ok(Quantiser::default()), Quantiser::new).map_err(|e| renamed(e, "quantise", "step"))?;
     let levels = interruptible(py, || Ok(in_precision!(&frame, frame => quantiser.apply(frame))))?;

@@ -19,9 +19,9 @@ fn points(argument: &'static str, object: &Bound<'_, PyAny>) -> Outcome<Vec<[f64
     }
 }
 
-/// A grey frame in single precision.
+/// A grey frame in single precision, NaN where it is masked.
 fn grey(argument: &str, object: &Bound<'_, PyAny>) -> Outcome<Frame<f32>> {
-    Ok(arrays::frame(argument, object, ColourRule::Refuse)?.to_real())
+    Ok(arrays::frame_with_gaps(argument, object, ColourRule::Refuse)?.to_real())
 }
 
 /// Points as a new array (N, 2).
@@ -37,8 +37,8 @@ fn pairs(py: Python<'_>, points: Vec<[f64; 2]>) -> Outcome<Bound<'_, PyAny>> {
 /// neighbours. It is at least `min_distance` px away from every better corner and from every point of
 /// `existing` (N, 2). At most `max_count` corners, `existing` not counted.
 ///
-/// Returns positions (x, y) px, float64 (N, 2), best first. There are no corners where a window touches NaN.
-/// ValueError for a number out of its range and for a colour frame.
+/// Returns positions (x, y) px, float64 (N, 2), best first. There are no corners where a window touches NaN
+/// or a masked pixel. ValueError for a number out of its range and for a colour frame.
 #[pyfunction]
 #[pyo3(signature = (
     frame, *, max_count=500, quality=0.005, min_distance=6.0, window=3, existing=None, threads=None
@@ -80,10 +80,10 @@ fn span(frame: &Frame<f32>) -> f64 {
 /// px. `guesses` (N, 2): expected flow, default zero.
 ///
 /// `ok` is False unless the flow back from the new position leads to within `forward_backward` px of the
-/// point (None: not tested). A point is lost (NaN) when it leaves the frame, when its window touches NaN, or
-/// when the window has too little structure: smaller eigenvalue of its mean structure tensor below
-/// `min_eigenvalue`, (levels/px)^2. None: 0.1 where the first frame spans 255 levels, scaled by the square of
-/// its span.
+/// point (None: not tested). A point is lost (NaN) when it leaves the frame, when its window touches NaN or
+/// a masked pixel, or when the window has too little structure: smaller eigenvalue of its mean structure
+/// tensor below `min_eigenvalue`, (levels/px)^2. None: 0.1 where the first frame spans 255 levels, scaled by
+/// the square of its span.
 ///
 /// Returns flow (u, v) px/frame, float64 (N, 2); ok, bool (N,); error, the distance between forward and back,
 /// px, float64 (N,). ValueError for a number out of its range, for frames of different shape and for colour

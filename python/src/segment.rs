@@ -7,6 +7,7 @@ use crate::options::{self, Integer, named};
 use jacoflow::error::{Error, Result, shape_text};
 use jacoflow::parallel::Threads;
 use jacoflow::segment::{EdgeWeight, SegmentImage, SegmentOptions, felzenszwalb, region_means};
+use jacoflow::track::GreyLevels;
 use jacoflow::types::{Frame, Sample};
 use numpy::PyUntypedArrayMethods;
 use pyo3::prelude::*;
@@ -56,7 +57,7 @@ pub fn segment_felzenszwalb<'py>(
     let min_size = usize::try_from(min_size)
         .map_err(|_| Error::argument("min_size", "a number of pixels, at least 0", min_size))?;
     let options = SegmentOptions { scale, sigma, min_size };
-    let array = arrays::as_array("image", image)?;
+    let array = arrays::unmasked("image", image, GreyLevels::of_integers())?;
     arrays::check_size("image", &array)?;
     let array = exact_samples("image", array)?;
     let shape = array.shape().to_vec();

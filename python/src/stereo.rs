@@ -8,19 +8,32 @@ use jacoflow::error::{Error, Result};
 use jacoflow::io::{DisparityFormat, DisparityMap};
 use jacoflow::stereo::{self, EdgeDisparityOptions, EdgeMap, EdgeSettings, Method, RowOffset};
 use jacoflow::track::GreyLevels;
-use jacoflow::types::{AnyFrame, Frame};
+use jacoflow::types::{AnyFrame, Frame, Sample};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
 
-/// Views in 8-bit grey levels; those of floats decide together what their white is.
+/// Views in 8-bit grey levels, NaN where they are masked; those of floats decide together what their white
+/// is.
 fn grey_levels<const N: usize>(views: [(&str, &Bound<'_, PyAny>); N]) -> Outcome<[Frame<f32>; N]> {
-    let mut frames = Vec::with_capacity(N);
+    let (mut frames, mut levels) = (Vec::with_capacity(N), GreyLevels::of_integers());
     for (name, view) in views {
-        frames.push(arrays::frame(name, view, ColourRule::Luminance)?);
+        let (frame, given) = arrays::typed_frame(name, view, ColourRule::Luminance)?;
+        // Masked integers are floats in the frame, and have the white of integers.
+        if given == frame.dtype() {
+            levels = levels.revised(std::slice::from_ref(&frame));
+        }
+        frames.push((frame, given));
     }
-    let levels = GreyLevels::decide_together(&frames);
-    Ok(std::array::from_fn(|i| in_levels(&frames[i], levels.gain(&frames[i]))))
+    Ok(std::array::from_fn(|i| {
+        let (frame, given) = &frames[i];
+        let gain = match *given {
+            u8::DTYPE => 1.0,
+            u16::DTYPE => 1.0 / 257.0,
+            _ => levels.float_gain(),
+        };
+        in_levels(frame, gain)
+    }))
 }
 
 /// Samples times a gain, in single precision.
@@ -82,7 +95,7 @@ impl Search {
 impl Matching<'_> {
     /// With these options, too.
     fn add_to(self, options: EdgeDisparityOptions) -> Outcome<EdgeDisparityOptions> {
-        let prior = self.prior.map(|prior| arrays::frame("prior", &prior, ColourRule::Refuse)).transpose()?;
+        let prior = self.prior.map(|prior| arrays::frame_with_gaps("prior", &prior, ColourRule::Refuse)).transpose()?;
         Ok(EdgeDisparityOptions {
             method: Method::parse(&self.method)?,
             row_offset: self.row_offset,

@@ -91,9 +91,57 @@ def test_others_take_other_types_too(take):
         take(frame + 2**60)
 
 
-def test_segments_are_those_of_plain_frames():
-    with pytest.raises(TypeError, match="masked"):
-        jacoflow.segment.felzenszwalb(np.ma.array(np.zeros((64, 64))))
+WHITE = {"uint8": 255, "uint16": 65535}
+
+
+def raw(samples, dtype):
+    return samples
+
+
+def in_levels(samples, dtype):
+    return samples / (WHITE.get(dtype, 255) // 255)
+
+
+def in_shares(samples, dtype):
+    return samples / np.float32(WHITE.get(dtype, 1))
+
+
+def disparities(view, **options):
+    found = jacoflow.stereo.edge_disparity(view, np.roll(view, -3, 1), disparity_range=(-8, 8), row_offset=0.0, **options)
+    return found.disparity, found.score
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "int16", "int32", "float32", "float64"])
+@pytest.mark.parametrize(
+    ("call", "unit"),
+    [
+        (lambda frame: [jacoflow.corners(frame, min_distance=3)], raw),
+        (lambda frame: jacoflow.point_flow(frame, np.roll(frame, 1, 1), [[30.0, 20.0], [36.0, 33.0], [70.0, 70.0]]), raw),
+        (lambda frame: [jacoflow.smooth(frame, 1.5)], raw),
+        (lambda frame: [jacoflow.quantise(frame, 5)], raw),
+        (lambda frame: [jacoflow.segment.felzenszwalb(frame, scale=100)], in_shares),
+        (disparities, in_levels),
+        (lambda frame: disparities(frame, method="classes"), in_levels),
+        (jacoflow.stereo.edge_pixels, in_levels),
+    ],
+    ids=["corners", "point_flow", "smooth", "quantise", "felzenszwalb", "edge_disparity", "classes", "edge_pixels"],
+)
+def test_masked_pixels_are_nan_in_other_functions(call, unit, dtype):
+    cells = np.random.default_rng(1).integers(0, 200, (12, 12)).repeat(8, 0).repeat(8, 1)
+    samples = (cells * 257 if dtype == "uint16" else cells).astype(dtype)
+    hidden = np.zeros(cells.shape, bool)
+    hidden[30:38, 30:42] = True
+    filled = unit(samples.astype(np.float64 if dtype in ("int32", "float64") else np.float32), dtype)
+    filled[hidden] = np.nan
+    masked = np.ma.array(np.where(hidden, 99, samples), mask=hidden)
+    assert masked.dtype == samples.dtype
+    for got, want in zip(call(masked), call(filled), strict=True):
+        assert_array_equal(got, want)
+
+
+def test_masked_values_have_no_part_in_means():
+    labels, values = np.array([[0, 0, 1]]), np.ma.array([[1, 2, 3]], mask=[[False, True, True]])
+    assert_array_equal(jacoflow.segment.region_means(labels, values), [1.0, np.nan])
 
 
 @pytest.mark.parametrize("frame", [3, np.int64(3), np.array(3.0)])
