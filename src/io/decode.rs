@@ -2,10 +2,10 @@
 
 use super::limits::{MAX_SIDE, check_size, io_error, memory_limit};
 use super::{channels::ChannelPolicy, channels::Channels, jpeg, pages::Pages, planes::PlaneSelection, pnm};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_memory};
 use crate::types::Sample;
 use ::image::metadata::Orientation;
-use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader, ImageResult};
+use ::image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
@@ -19,8 +19,8 @@ pub(crate) const EXTENSIONS: &[&str] = &["png", "tif", "tiff", "bmp", "pgm", "pn
 ///
 /// # Errors
 /// [`Error::Io`] when the file cannot be read; [`Error::Format`] when it is damaged, of an unknown format or
-/// too large, has several pages, or `policy` refuses it; [`Error::Missing`] for a kind of TIFF that is not
-/// read.
+/// too large, has several pages, or `policy` refuses it; [`Error::Memory`] where its samples do not fit into
+/// memory; [`Error::Missing`] for a kind of TIFF that is not read.
 pub fn read_image<P: ChannelPolicy>(path: impl AsRef<Path>, policy: P) -> Result<P::Frame> {
     read_plane(path, policy, PlaneSelection::default())
 }
@@ -90,7 +90,7 @@ fn read_one_picture<P: ChannelPolicy>(path: &Path, policy: P) -> Result<P::Frame
     if reader.format() == Some(ImageFormat::Pnm) {
         pnm::check(path)?;
     }
-    let picture = upright(reader, memory).map_err(|error| image_error(path, error))?;
+    let picture = upright(path, reader, memory)?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     check_size(path, width, height)?;
     let place = Place { path, width, height };
@@ -122,14 +122,17 @@ impl Place<'_> {
 }
 
 /// The picture, turned as its EXIF data say for the display.
-fn upright(reader: ImageReader<BufReader<File>>, memory: u64) -> ImageResult<DynamicImage> {
-    let mut decoder = reader.into_decoder()?;
+fn upright(path: &Path, reader: ImageReader<BufReader<File>>, memory: u64) -> Result<DynamicImage> {
+    let damaged = |error| image_error(path, error);
+    let mut decoder = reader.into_decoder().map_err(damaged)?;
     let mut limits = ::image::Limits::default();
     limits.max_alloc = Some(memory);
-    limits.reserve(decoder.total_bytes())?;
+    limits.reserve(decoder.total_bytes()).map_err(damaged)?;
     // Damaged EXIF data are no reason to refuse a picture.
     let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
-    let mut picture = DynamicImage::from_decoder(decoder)?;
+    let copies = if orientation == Orientation::NoTransforms { 1 } else { 2 };
+    check_memory(&path.display().to_string(), usize::try_from(copies * decoder.total_bytes()).ok())?;
+    let mut picture = DynamicImage::from_decoder(decoder).map_err(damaged)?;
     picture.apply_orientation(orientation);
     Ok(picture)
 }

@@ -9,6 +9,7 @@ import types
 
 import numpy as np
 import pytest
+import tifffile
 
 import jacoflow
 from jacoflow import FlowFilter, filters, io, mixture, motion3d, plot, scenes, segment, stereo, track
@@ -257,19 +258,40 @@ def test_filters_of_wrong_sizes_name_them():
 
 
 def test_a_picture_as_large_as_memory_is_described(tmp_path):
-    """A few hundred kilobytes that are 400 million pixels: 400 MB, and no more than that."""
+    """Less than a megabyte that is 900 million pixels: 900 MB, and no more than that."""
     import struct
     import zlib
 
-    side = 20_000
+    side = 30_000
     packer = zlib.compressobj(1)
     rows = b"".join(packer.compress(bytes(side + 1)) for _ in range(side)) + packer.flush()
     chunks = [(b"IHDR", struct.pack(">IIBBBBB", side, side, 8, 0, 0, 0, 0)), (b"IDAT", rows), (b"IEND", b"")]
     path = tmp_path / "large.png"
     path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks))
-    limited = "import resource, sys; resource.setrlimit(resource.RLIMIT_AS, (3 << 30,) * 2); import jacoflow.__main__ as program; sys.argv = ['jacoflow', 'info', sys.argv[1]]; sys.exit(program.main())"
-    ended = subprocess.run([sys.executable, "-c", limited, str(path)], capture_output=True, text=True, check=False)
+    page = tmp_path / "large.tif"
+    strip = zlib.compress(bytes(1000 * side))
+    tifffile.imwrite(page, iter([strip] * (side // 1000)), shape=(side, side), dtype=np.uint8, compression="zlib", rowsperstrip=1000)
+    limited = "import resource, sys; import jacoflow.__main__ as program; resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[1]) << 20,) * 2); {}"
+    info = "sys.argv = ['jacoflow', 'info', sys.argv[2]]; sys.exit(program.main())"
+    read = """
+try:
+    program.sys.modules['jacoflow'].io.read_image(sys.argv[2])
+except MemoryError as error:
+    print(error)
+"""
+
+    def run(what, megabytes, file):
+        return subprocess.run([sys.executable, "-c", limited.format(what), str(megabytes), str(file)], capture_output=True, text=True, check=False)
+
+    ended = run(info, 3000, path)
     assert ended.returncode == 0 and f"width         {side}" in ended.stdout, ended.stderr
+    # With less memory than that it is an error.
+    for file in (path, page):
+        words = f"{file}: expected what fits into memory"
+        ended = run(info, 900, file)
+        assert ended.returncode == 1 and words in ended.stderr, ended.stderr
+        ended = run(read, 900, file)
+        assert ended.returncode == 0 and ended.stdout.startswith(words), ended.stderr
 
 
 def test_the_fuzzer_finds_nothing():

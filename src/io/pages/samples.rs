@@ -2,7 +2,7 @@
 
 use super::directory::{FileDecoder, number, numbers, tiff_error, unsupported};
 use super::stored::{LZMA, LZW, PALETTE, ZSTANDARD, restated};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_memory};
 use crate::io::channels::{ChannelPolicy, Channels};
 use crate::io::exact::{exact_doubles, widened};
 use crate::io::limits::check_size;
@@ -76,6 +76,8 @@ impl Place<'_> {
         if count > 1 && has_cut_tiles(decoder) {
             return Err(unsupported(path, "colours in planes of tiles that reach beyond the picture"));
         }
+        let bytes = self.width.checked_mul(self.height * count * usize::from(bits.div_ceil(8)));
+        check_memory(&path.display().to_string(), bytes)?;
         let mut result = DecodingResult::U8(Vec::new());
         let layout = decoder.read_image_to_buffer(&mut result).map_err(|e| tiff_error(path, e))?;
         let planes = if layout.planes > 1 { count } else { 1 };
