@@ -139,7 +139,10 @@ def open_npz(request: Request) -> Stack:
                 shapes = dict.fromkeys(archive.files, ())
     except FileNotFoundError:
         raise
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+    except MemoryError as error:
+        # NumPy allocates what a header states before it reads any of it.
+        raise FormatError(f"{request.source}: holds, or is cut off and only states, an array that memory does not hold ({error})") from error
+    except (OSError, OverflowError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
         raise FormatError(f"{request.source}: no .npz archive of plain arrays ({error})") from error
     array = arrays[_chosen(request, shapes)]
     return _stack(request, array.shape, array.__getitem__, lambda: array)

@@ -1,8 +1,10 @@
 """Arrays in .npz, HDF5 and MATLAB files as frames, and files that only others read."""
 
+import io as std_io
 import pickle
 import subprocess
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -119,6 +121,17 @@ def test_mistakes_are_named(saved):
     path.unlink()
     with pytest.raises(FileNotFoundError):
         io.frames(path)
+
+
+@pytest.mark.parametrize("shape", [(2**40, 100, 100), (2**33, 1, 1), (2**62, 4, 4), (2**64 - 100, 1, 1), (2**70, 2, 2)])
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
+def test_an_archive_that_lies_about_its_size_is_damaged(shape, tmp_path):
+    header = std_io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "|u1", "fortran_order": False, "shape": shape})
+    with zipfile.ZipFile(tmp_path / "a.npz", "w") as archive:
+        archive.writestr("frames.npy", header.getvalue() + bytes(100))
+    with pytest.raises(jacoflow.FormatError, match="a.npz: "):
+        io.frames(tmp_path / "a.npz")
 
 
 def test_key_is_for_archives(tmp_path):
