@@ -93,8 +93,12 @@ def test_a_damaged_state_is_described_in_either_precision(tmp_path):
         good = dict(np.load(tmp_path / "state.npz"))
         unknown = {name: np.array(array) for name, array in good.items()}
         unknown["mean"].flat[3] = np.nan
+        infinite, vast = ({name: np.array(array) for name, array in good.items()} for _ in range(2))
+        infinite["root"].flat[0], vast["mean"].flat[3] = np.inf, 1e308 if precision == "float64" else 3e38
         for arrays, words in (
             (unknown, "array 'mean' holds NaN, expected numbers from"),
+            (infinite, "array 'root' holds inf, expected numbers from"),
+            (vast, "array 'mean' holds "),
             ({**good, "mean": good["mean"][:-1]}, "expected mean of shape "),
             ({name: array for name, array in good.items() if name != "root"}, "root"),
         ):

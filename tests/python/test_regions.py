@@ -87,6 +87,7 @@ def fan_field():
         ((40, 40, 81, 81), None),  # A box round the fan, a fifth of it wall.
         ((60, 60, 40, 40), None),
         ((*CENTRE, 20.0), None),
+        ((70, 60, 65, 40), None),  # Half of the fan and its hub, a quarter of the region wall.
         ([(50, 50), (110, 50), (110, 110), (50, 110)], None),
         (None, CENTRE),  # The whole frame, a tenth of it fan.
     ],
@@ -320,6 +321,34 @@ def test_the_pixel_may_be_any_pair(fan_field, at):
 def test_what_is_no_pixel_is_named(fan_field, at):
     with pytest.raises((TypeError, ValueError), match="^at: expected"):
         fan_field.measure("rpm", at=at)
+
+
+def in_the_binary(tmp_path, frames, quantity, *options):
+    """Value and standard deviation in the first row of `jacoflow measure` over the disc."""
+    jacoflow.io.write_frames(tmp_path / "frames.npy", np.array(frames))
+    disc = ",".join(map(str, DISC))
+    command = [sys.executable, "-m", "jacoflow", "measure", str(tmp_path / "frames.npy"), "--quantity", quantity, "--disc", disc, *options]
+    rows = csv.DictReader(subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines())
+    row = next(rows)
+    assert row["status"] == "ok"
+    return float(row["value"]), float(row["std"])
+
+
+def test_the_binary_has_the_rates_of_the_motion(tmp_path):
+    angle = np.radians(15)
+    views = [turned(PICTURE, k * angle) for k in (-1, 0, 1)]
+    assert_allclose(in_the_binary(tmp_path, views, "angular_velocity")[0], angle, rtol=1e-3)
+    views = [moved(PICTURE, np.eye(2)), moved(PICTURE, 1.2 * np.eye(2))]
+    assert_allclose(in_the_binary(tmp_path, views, "divergence")[0], 2 * np.log(1.2), rtol=1e-3)
+
+
+@pytest.mark.parametrize("frames", [59.0, 9.0, 4.0])
+def test_the_binary_counts_the_time_to_contact_from_the_frame_of_the_field(frames, tmp_path):
+    views = [moved(PICTURE, np.eye(2) * frames / (frames - k)) for k in (-1, 0, 1)]
+    for used, options in ((views, ()), (views, ("--fps", "20")), (views[1:], ())):
+        period = 1 / 20 if options else 1
+        value, std = in_the_binary(tmp_path, used, "time_to_contact", *options)
+        assert abs(value - frames * period) < max(4 * std, 1e-3 * frames * period) and std < 0.1 * frames * period
 
 
 def test_the_binary_measures_the_parameters_too(tmp_path):

@@ -36,6 +36,24 @@ def test_channels_are_not_taken_for_time(ome, tmp_path):
         io.frames(path, channel=2)
 
 
+def test_the_flow_of_a_channel_is_that_of_its_motion(tmp_path):
+    """1.5 px a frame in one channel, none in the other; pixels of 5 µm, 0.4 s a frame."""
+    texture = RNG.uniform(0, 255, (64, 160))
+    for axis in (0, 1, 0, 1):
+        texture = (np.roll(texture, -1, axis) + 2 * texture + np.roll(texture, 1, axis)) / 4
+    spectrum, waves = np.fft.rfft(texture, axis=1), np.fft.rfftfreq(160)
+    moving = [np.fft.irfft(spectrum * np.exp(-2j * np.pi * waves * 1.5 * k), 160, axis=1)[:, 20:116] for k in range(4)]
+    stack = np.rint([[texture[:, 20:116], frame] for frame in moving]).astype(np.uint8)
+    path = tmp_path / "cells.tif"
+    tifffile.imwrite(path, stack, imagej=True, resolution=(0.2, 0.2), metadata={"axes": "TCYX", "finterval": 0.4, "unit": "micron"})
+    for channel, shift in ((0, 0.0), (1, 1.5)):
+        found = jacoflow.estimate(io.frames(path, channel=channel))[1].measure("u")
+        assert found.unit == "µm/s" and abs(found.value - shift * 5 / 0.4) < max(4 * found.std, 0.1), found
+        command = [sys.executable, "-m", "jacoflow", "measure", str(path), "--channel", str(channel), "--quantity", "u"]
+        row = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[1].split(",")
+        assert row[1] == "0.4" and row[7] == "µm/s" and abs(float(row[5]) - shift * 5 / 0.4) < max(4 * float(row[6]), 0.1), row
+
+
 @pytest.mark.parametrize("kind", ["imagej", "ome"])
 def test_slices_are_chosen_too(kind, tmp_path):
     path = tmp_path / "stack.ome.tif"

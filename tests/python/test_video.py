@@ -1,7 +1,9 @@
 """Compressed video: right frames, right brightness, files closed, clear refusals."""
 
+import os
 import pickle
 import struct
+import subprocess
 import sys
 from fractions import Fraction
 
@@ -275,6 +277,48 @@ def test_estimate_goes_by_the_times_of_the_frames(tmp_path):
     assert stack[2].advect([[20.0, 20.0]])[0, 0] == pytest.approx(22, abs=0.1)
     given = jacoflow.estimate(io.frames(path), fps=10)
     assert {field.frame_period for field in given} == {0.1}
+
+
+def test_the_binary_opens_uncompressed_and_palette_video(tmp_path):
+    """1 px a frame, 25 frames a second."""
+    ffmpeg = pytest.importorskip("imageio_ffmpeg").get_ffmpeg_exe()
+    (tmp_path / "ffmpeg").symlink_to(ffmpeg)
+    frames = walking(range(4))
+    encode(tmp_path / "raw.avi", "rawvideo", "bgr24", [np.repeat(frame[..., None], 3, axis=2) for frame in frames], "rgb24")
+    pytest.importorskip("imageio.v3").imwrite(tmp_path / "clip.gif", np.array(frames), duration=40)
+    encode(tmp_path / "vfr.mkv", "ffv1", "gray", walking([0, 1, 2, 4, 5]), "gray", milliseconds=[0, 40, 80, 160, 200])
+    environment = {**os.environ, "PATH": str(tmp_path)}
+
+    def run(*arguments):
+        command = [sys.executable, "-m", "jacoflow", *arguments]
+        return subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True).stdout.splitlines()
+
+    for name in ("raw.avi", "clip.gif"):
+        row = run("measure", name, "--luminance", "--quantity", "u", "--region", "12,12,40,24")[1].split(",")
+        assert row[1] == "0.04" and row[7] == "px/s" and float(row[5]) == pytest.approx(25, rel=0.01), row
+    # Rows of fields and states have the times that the video has for their frames.
+    times = {"flow": ["0.04", "0.08", "0.16"], "filter": ["0.0", "0.04", "0.08", "0.16", "0.2"]}
+    for command, expected in times.items():
+        header, *rows = run(command, "vfr.mkv", "--points", "32,24")
+        assert header.startswith("frame,time_s,x,y,status,u,v")
+        assert [float(row.split(",")[1]) for row in rows] == pytest.approx([float(time) for time in expected], abs=1e-3)
+
+
+def test_an_approach_through_a_lossy_codec(tmp_path):
+    """Contact 2.98 s after the frame of the field, in H.264 with its usual loss."""
+    if "libx264" not in av.codecs_available:
+        pytest.skip("PyAV without libx264")
+    frames = jacoflow.scenes.Scene("plane", width=160, height=120, time_to_contact=2.98 * RATE + 2).frames(5)
+    noisy = [np.clip(np.rint(frame + np.random.default_rng(k).normal(0, 2, frame.shape)), 0, 255).astype(np.uint8) for k, frame in enumerate(frames)]
+    path = encode(tmp_path / "approach.mp4", "libx264", "yuv420p", noisy, "gray")
+    frames = list(io.frames(path))
+    for used in (frames[1:4], frames[2:4]):
+        field = jacoflow.flow(*used, fps=RATE)
+        region = (20, 20, 120, 80)
+        found = field.measure("time_to_contact", region)
+        value, std, _ = field.region_mean("time_to_contact", region)
+        assert abs(found.value - 2.98) < 4 * found.std and found.std < 1, found
+        assert abs(value - 2.98) < 4 * std and std < 2, (value, std)
 
 
 def test_rounded_times_of_an_even_rate_are_even(tmp_path):
