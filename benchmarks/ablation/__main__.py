@@ -8,7 +8,7 @@ environment variable JACOFLOW_WITHOUT; `--jobs` of them run at once. `--keep` na
 holds are not repeated, new ones are added to it. The difference is "without minus with", paired by scene or
 seed, with its standard error. Verdict: a heuristic `pays` if some row is worse without it by more than two
 standard errors; it `harms` if none is worse and some row is better by as much; else it has `no effect`. Times
-(`ms`) have a vote only with `--jobs 1`: runs beside each other disturb them.
+(`ms`) are shown only: the runs of a pair lie minutes apart, and what else the machine does differs.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def main() -> None:
             summary.append({"heuristic": name, "purpose": why, "verdict": f"failed: {problem}"})
             continue
         rows = comparison(with_it, without, larger)
-        said = verdict([row for row in rows if options.jobs == 1 or not str(row["row"]).endswith("ms")])
+        said = verdict(rows)
         print(
             f"## {name}: {why}\n\n" + "\n".join(report.table_lines(rows)) + f"\n\n{said}\n",
             flush=True,
@@ -160,7 +160,8 @@ def comparison(with_it: Values, without: Values, larger_is_better: Sequence[str]
 
 
 def verdict(rows: Sequence[Mapping[str, object]]) -> str:
-    """`pays`, `harms` or `no effect`, with the rows that say so."""
+    """`pays`, `harms` or `no effect`, with the rows that say so; times do not count."""
+    rows = [row for row in rows if not str(row["row"]).endswith("ms")]
     for effect, word in (("worse", "pays"), ("better", "harms")):
         if found := [str(row["row"]) for row in rows if row["without it"] == effect]:
             return f"{word}: {', '.join(found)}"
