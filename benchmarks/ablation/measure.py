@@ -15,14 +15,17 @@ from benchmarks.tables.limits import SQUARE, eight_bit
 
 SEEDS = tuple(range(10, 18))
 """Of textures and noise; the constants were chosen on others."""
-DIFFERENCES, RADII, ANGLES, NOISES = (0.1, 0.2, 0.4), (20.0, 30.0, 45.0), (0.02, 0.06), (0.5, 2.0)
+DIFFERENCES, RADII, ANGLES, NOISES = (0.1, 0.2, 0.4), (15.0, 20.0, 30.0, 45.0), (0.02, 0.06), (0.5, 2.0)
+SMALL = 20.0
+"""Radius, px, up to which slopes see the wall beside a disc."""
 MAX_LOSS = 50.0
 """So that one wrong value does not hide all others."""
 
 
 def rows() -> dict[str, list[float]]:
     """One value for each region."""
-    found: dict[str, list[float]] = {name: [] for name in ("two motions", "discs", "plane", "none found", "waves, none found", "minority, found")}
+    names = ("two motions", "small discs", "discs", "plane", "none found", "waves, none found", "minority, found")
+    found: dict[str, list[float]] = {name: [] for name in names}
     for seed in SEEDS:
         picture = steps.texture(seed)
         for difference in DIFFERENCES:
@@ -40,7 +43,8 @@ def rows() -> dict[str, list[float]]:
             for angle in ANGLES:
                 pair = [np.where(inside, steps.moved(picture, steps.turn(k * angle)), wall) for k in range(2)]
                 disc = (*steps.CENTRE, radius - 3.0)
-                add(found, "discs", measured(seed, pair, 1.0, "angular_velocity", disc), angle)
+                row = "small discs" if radius <= SMALL else "discs"
+                add(found, row, measured(seed, pair, 1.0, "angular_velocity", disc), angle)
         for noise in NOISES:
             pair = [steps.moved(picture, np.eye(2)), steps.moved(picture, 1.01 * np.eye(2), (0.37, 0.0))]
             add(found, "plane", measured(seed, pair, noise, "divergence", SQUARE), 2 * np.log(1.01))
