@@ -23,13 +23,15 @@ SECTIONS: dict[str, tuple[str, ...]] = {
     "memory": ("memory",),
     "filter": ("filter", "flow_filter"),
     "controlled": ("controlled",),
+    "defaults": ("defaults",),
     "coverage": ("coverage",),
     "recordings": ("recordings",),
     "tracking": ("tracking_parts", "tracking", "tracking_ours", "tracking_recordings"),
     "mixture": ("mixture", "dirichlet_mixture"),
     "stereo": ("stereo", "stereo_prior", "stereo_recordings"),
-    "stereo_tracking": ("stereo_tracking", "stereo_tracking_chance"),
-    "particle_tracking": ("particle_tracking",),
+    "segmentation": ("segmentation",),
+    "stereo_tracking": ("stereo_tracking", "stereo_tracking_chance", "stereo_tracking_recordings"),
+    "particle_tracking": ("particle_filter", "particle_tracking"),
     "motion3d": tuple(
         f"motion3d_{part}"
         for part in (
@@ -42,6 +44,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
             "layouts",
             "fields",
             "speed",
+            "plain",
             "recordings",
             "drive",
             "car",

@@ -196,7 +196,7 @@ def resampling(particles: int, rounds: int) -> list[Row]:
 TABLES = {
     "accuracy": report.Table(
         f"Particle filter, worst of {STEPS} steps against the Kalman filter: median of seeds (largest); "
-        f"asked: {BARS}",
+        f"required: {BARS}",
         lambda o: accuracy(PARTICLES, report.trials(o, SEEDS)),
     ),
     "copies": report.Table("Particle filter, copies of weights .1 .2 .3 .4, n = 8", lambda _: copies()),

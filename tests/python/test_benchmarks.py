@@ -2,6 +2,7 @@
 
 
 import importlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -149,6 +150,11 @@ def test_every_table_has_a_title_of_its_own_and_readme_needs_no_other():
     assert {title for _, needed in readme.TABLES.values() for title in needed} <= set(titles)
 
 
+def test_the_comparison_has_every_table():
+    modules = {path.stem for path in (Path(compare.__file__).parent / "tables").glob("*.py")} - {"__init__"}
+    assert modules == {name for names in compare.SECTIONS.values() for name in names}
+
+
 def test_a_mean_has_the_standard_error_of_its_finite_values():
     mean, error = report.mean_and_error([1.0, 3.0, float("nan"), 5.0])
     assert mean == pytest.approx(3.0) and error == pytest.approx(2.0 / np.sqrt(3))
@@ -156,7 +162,7 @@ def test_a_mean_has_the_standard_error_of_its_finite_values():
 
 
 def test_a_heuristic_pays_if_a_row_is_worse_without_it_by_more_than_two_standard_errors():
-    base = {"error": [1.0, 2.0, 3.0], "found": [0.9, 0.8, 0.7]}
+    base = {"error": [1.0, 2.0, 3.0], "found": [0.9, 0.8, 0.7], "ms": [5.0, 6.0, 7.0]}
 
     def judged(**changed):
         return ablation.verdict(ablation.comparison(base, {**base, **changed}, ("found",)))
@@ -164,6 +170,8 @@ def test_a_heuristic_pays_if_a_row_is_worse_without_it_by_more_than_two_standard
     assert judged() == "no effect, results are the same"
     assert judged(error=[1.5, 2.6, 3.4]) == "pays: error"
     assert judged(error=[1.5, 1.6, 3.1]) == "no effect"
+    # A time says nothing of a rule, however clear.
+    assert judged(ms=[15.0, 16.0, 17.0]) == "no effect, results are the same"
     assert judged(error=[0.5, 1.4, 2.6]) == "harms: error"
     # Fewer targets found are worse, even beside a smaller error.
     assert judged(found=[0.7, 0.61, 0.5], error=[0.5, 1.4, 2.6]) == "pays: found"
