@@ -4,17 +4,18 @@
 //!
 //! 1. [`brightness_scale`], [`pyramid`]: frames are scaled to a common contrast and halved repeatedly. Above
 //!    the finest levels, [`brightness_change`] compares the frames along the motion; where gain or offset
-//!    differ, frames are equalised and the pyramid is filled again. 2. [`descent`]: from the coarsest level
-//!    down, each level repeats two steps: [`data_term`] warps the frames by the present motion and sums
-//!    windowed normal equations (rows 1 to 3 of WO2010/098160, (21)) at every second pixel; [`regularize`]
-//!    minimises data and robust smoothness terms together. [`resample`] carries the motion to the next level,
-//!    without its own peak locking.
-//!    3. [`refine`]: on the finest level, chooses at each site the window over which the motion is averaged;
-//!    three frames are warped by the result and refined once more. 4. [`peak_locking`], [`detail_bias`]:
-//!    measure and remove the bias of undersampled texture. 5. [`acceleration`]: three frames only; from the
-//!    mean of both steps to the step after the middle frame. 6. [`covariance`]: error sources measured in the
-//!    same frames. 7. [`output`]: the field at the requested sites, with status and diagnostics, its flow
-//!    first refined at every pixel by [`variational`].
+//!    differ, frames are equalised and the pyramid is filled again.
+//! 2. [`descent`]: from the coarsest level down, each level repeats two steps: [`data_term`] warps the frames
+//!    by the present motion and sums windowed normal equations (rows 1 to 3 of WO2010/098160, (21)) at every
+//!    second pixel; [`regularize`] minimises data and robust smoothness terms together. [`resample`] carries
+//!    the motion to the next level, without its own peak locking.
+//! 3. [`refine`]: on the finest level, chooses at each site the window over which the motion is averaged;
+//!    three frames are warped by the result and refined once more.
+//! 4. [`peak_locking`], [`detail_bias`]: measure and remove the bias of undersampled texture.
+//! 5. [`acceleration`]: three frames only; from the mean of both steps to the step after the middle frame.
+//! 6. [`covariance`]: error sources measured in the same frames.
+//! 7. [`output`]: the field at the requested sites, with status and diagnostics, its flow first refined at
+//!    every pixel by [`variational`].
 //!
 //! [`estimator`] runs the stages, [`schedule`] says how much work each level gets, [`estimate`] is what the
 //! stages leave for covariance and output. [`planes`], [`extended`], [`plane_pool`] and [`workspace`] hold
