@@ -9,10 +9,10 @@
 //! v_y]]`; divergence `u_x + v_y`, curl `v_x - u_y`.
 //!
 //! # Map
-//! Level by level, a module imports only from lower levels: [`error`], [`types`], [`math`], [`parallel`],
-//! [`simd`] (0); [`image`] (1); [`jet`], [`io`], [`synth`] (2); [`flow`], [`filter`],
-//! [`mixture`], [`motion3d`], [`segment`], [`stereo`] (3); [`temporal`], [`track`] (4); [`pipeline`] (5);
-//! [`cli`], the binary (6). Each room from level 1 up, and [`filter`], is a Cargo feature of its name;
+//! Level by level, a module imports only from lower levels: [`ablation`], [`error`], [`types`], [`math`],
+//! [`simd`], [`parallel`], [`buffer_pool`] (0); [`image`], [`scattered`] (1); [`jet`], [`io`], [`synth`] (2);
+//! [`flow`], [`filter`], [`mixture`], [`motion3d`], [`segment`], [`stereo`] (3); [`temporal`], [`track`] (4);
+//! [`pipeline`] (5); [`cli`], the binary (6). Each room from level 1 up, and [`filter`], is a Cargo feature of its name;
 //! `default-features = false, features = ["filter"]` gives the filters alone. The Python binding is a package
 //! of its own, `python/`.
 
