@@ -244,7 +244,7 @@ class ParticleTracker:
     def update(self, frame: ArrayLike, camera: ArrayLike | None = None) -> ParticleStep:
         """The targets in the next frame, an array (H, W, 3) as large as the first.
 
-        A frame without finite pixels is one in which nothing was seen: targets move on, nothing is learnt.
+        A frame without finite pixels is one in which nothing was seen: targets move on, nothing is learned.
         `camera`: the background's motion since the frame before where it is known, (2, 3): (x', y') = camera
         @ (x, y, 1), px; default: measured.
 
@@ -255,16 +255,16 @@ class ParticleTracker:
         """
         return step_of(self._tracker.update(as_frame(frame), checked_camera(camera)))
 
-    def add(self, box: ArrayLike, id: int | None = None) -> int:
+    def add(self, bbox: ArrayLike, id: int | None = None) -> int:
         """Adds a target at the last frame by its box (left, top, width, height), px; returns its number, by
         default the next one. A target that is out of the picture may be added again under its own.
 
         Raises
         ------
         ValueError
-            For a `box` that is not finite, has no area or lies outside, and an `id` that is in use.
+            For a `bbox` that is not finite, has no area or lies outside, and an `id` that is in use.
         """
-        return self._tracker.add(checked_box("box", box), None if id is None else checked_id(id))
+        return self._tracker.add(checked_box("bbox", bbox), None if id is None else checked_id(id))
 
     def remove(self, id: int) -> None:
         """Removes the target with this number (no unit). ValueError where there is none."""

@@ -151,7 +151,7 @@ impl EgomotionCommand {
             camera: intrinsics(&self.intrinsics)?,
             field: FieldOptions {
                 spacing: self.spacing,
-                most: self.max_points,
+                max_points: self.max_points,
                 region: self.grid.region,
                 ..FieldOptions::default()
             },

@@ -42,7 +42,7 @@ use std::ffi::OsString;
     jacoflow demo -o demo\n  \
     jacoflow flow frames/ -o out/ --picture colour,divergence\n  \
     jacoflow measure disc.y4m --quantity rpm --region 80,40,64,64 --fps 100\n  \
-    jacoflow track video.y4m --box 120,80,24,30 -o track.csv\n  \
+    jacoflow track video.y4m --bbox 120,80,24,30 -o track.csv\n  \
     jacoflow stereo left/ right/ -o out/ --picture pictures/\n  \
     jacoflow egomotion drive/ --intrinsics 707.1,707.1,601.9,183.1 -o motion.csv"
 )]

@@ -46,7 +46,7 @@ pub struct MatchingArguments {
     Brightness is taken on the scale 0 to 255: 16-bit samples are divided by 257, floats multiplied by 255 unless at least half of what is not dark (above 0.1) exceeds 1.5.\n\n\
     Examples:\n  \
     jacoflow stereo left/ right/ -o out/ --format npz,pfm --picture pictures/\n  \
-    jacoflow stereo l.png r.png -o d.pfm --disparities 0,63 --row-offset 0\n  \
+    jacoflow stereo l.png r.png -o d.pfm --disparity-range 0,63 --row-offset 0\n  \
     jacoflow stereo video.y4m --layout side-by-side -o out/ --method classes"
 )]
 pub struct StereoCommand {
@@ -123,8 +123,8 @@ impl StereoCommand {
         let (search, defaults) = (&self.matching.search, EdgeDisparityOptions::default());
         let options = EdgeDisparityOptions {
             method: Method::parse(&self.matching.method)?,
-            disparity_range: search.disparities.unwrap_or(defaults.disparity_range),
-            row_range: search.rows.unwrap_or(defaults.row_range),
+            disparity_range: search.disparity_range.unwrap_or(defaults.disparity_range),
+            row_range: search.row_range.unwrap_or(defaults.row_range),
             row_offset: search.row_offset,
             subpixel: !self.matching.whole,
             left_right_check: !self.matching.unchecked,
@@ -273,7 +273,7 @@ pub fn rows_doubted(pairs: usize) -> String {
     match pairs {
         0 => String::new(),
         _ => format!(
-            "; the views of {pairs} pairs hardly agree with any row offset that was searched, and many of their disparities are wrong (--rows LEAST,GREATEST widens the search, --row-offset gives it)"
+            "; the views of {pairs} pairs agree poorly with every row offset that was searched, and many of their disparities are wrong (--row-range MIN,MAX widens the search, --row-offset gives it)"
         ),
     }
 }

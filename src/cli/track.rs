@@ -34,9 +34,9 @@ use std::path::PathBuf;
     there is is kept in name.partial.csv, ....\n\n\
     Examples:\n  \
     jacoflow track video.y4m > track.csv\n  \
-    jacoflow track frames/ --box 120,80,24,30 --box 40,60,12,12 -o out/ --format csv,mot\n  \
-    jacoflow track video.mp4 --luminance --point 64,48 -o track.csv --overlay pictures/\n  \
-    jacoflow track frames/ --method particle --box 40,60,24,66 --box 90,58,26,70 --mot out.txt --csv out.csv --overlay out.y4m\n  \
+    jacoflow track frames/ --bbox 120,80,24,30 --bbox 40,60,12,12 -o out/ --format csv,mot\n  \
+    jacoflow track video.mp4 --luminance --center 64,48 -o track.csv --overlay pictures/\n  \
+    jacoflow track frames/ --method particle --bbox 40,60,24,66 --bbox 90,58,26,70 --mot out.txt --csv out.csv --overlay out.y4m\n  \
     jacoflow track frames/ --method particle --boxes first.csv --mot out.txt --foreground maps/\n  \
     jacoflow track left/ right/ --method stereo -o out/ --format csv,json --overlay pictures/ --graph graph.png\n  \
     jacoflow track video.mp4 --luminance --layout side-by-side --method stereo --cameras 800,0.12 -o clusters.csv"

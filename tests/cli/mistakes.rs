@@ -307,10 +307,10 @@ fn no_file_is_written_by_two_options() {
         ("filter s.npy -o x/ --save-state x/000001.npz", "save_state"),
         ("filter s.npy -o x/ --save-state x/points.csv", "save_state"),
         ("egomotion s.npy --intrinsics 40,40,20,16 -o x.csv --alternatives ./x.csv", "alternatives"),
-        ("track s.npy --method particle --box 5,5,9,9 --mot x --csv ./x", "csv"),
-        ("track s.npy --method particle --box 5,5,9,9 -o x/ --csv x/tracks.csv", "csv"),
-        ("track s.npy --box 5,5,9,9 -o x/ --overlay x/tracks.csv", "overlay"),
-        ("track s.npy --method particle --box 5,5,9,9 --overlay x.y4m --foreground x.y4m", "foreground"),
+        ("track s.npy --method particle --bbox 5,5,9,9 --mot x --csv ./x", "csv"),
+        ("track s.npy --method particle --bbox 5,5,9,9 -o x/ --csv x/tracks.csv", "csv"),
+        ("track s.npy --bbox 5,5,9,9 -o x/ --overlay x/tracks.csv", "overlay"),
+        ("track s.npy --method particle --bbox 5,5,9,9 --overlay x.y4m --foreground x.y4m", "foreground"),
         ("synth cars_handheld -o x.npy --boxes x.npy", "boxes"),
     ] {
         fails(&place, line, 2, &[&format!("error: {option}: expected a")]);

@@ -30,7 +30,7 @@ fn recorded(scene: &TargetScene) -> Place {
 fn boxes(scene: &TargetScene, frame: usize) -> String {
     (0..scene.target_count()).fold(String::new(), |mut options, target| {
         let TargetBox { x, y, width, height } = scene.target_box(frame, target);
-        write!(options, " --box {x},{y},{width},{height}").unwrap();
+        write!(options, " --bbox {x},{y},{width},{height}").unwrap();
         options
     })
 }
@@ -41,7 +41,7 @@ fn mot_line(scene: &TargetScene, frame: usize, target: usize, id: i64) -> String
     format!("{},{id},{},{},{width},{height},1,-1,-1,-1\n", frame + 1, x + 1.5, y + 1.5)
 }
 
-const QUICK: &str = "--method particle --particles 200 --quiet";
+const QUICK: &str = "--method particle --n-particles 200 --quiet";
 
 #[test]
 fn boxes_are_followed_into_every_kind_of_file() {
@@ -123,19 +123,19 @@ fn mistakes_are_named() {
     fs::write(place.path("late.csv"), mot_line(&scene, 2, 0, 1).replace("3,1,", "9,1,")).unwrap();
     let one = boxes(&scene, 0);
     for (options, words) in [
-        ("--method particle".to_string(), vec!["box: expected", "--boxes"]),
+        ("--method particle".to_string(), vec!["bbox: expected", "--boxes"]),
         (format!("--method particle --boxes first.csv{one}"), vec!["boxes: expected either"]),
         ("--method particle --boxes late.csv".into(), vec!["boxes: expected", "late.csv"]),
-        (format!("--method particle{one} --point 3,4"), vec!["point: expected", "--method gradient"]),
+        (format!("--method particle{one} --center 3,4"), vec!["center: expected", "--method gradient"]),
         (format!("--method particle{one} --model affine"), vec!["model: expected", "--method gradient"]),
         (format!("--method particle{one} --cameras 800,1"), vec!["cameras: expected", "--method stereo"]),
         (format!("--method particle{one} --luminance"), vec!["luminance: expected", "colour is needed"]),
         (format!("--method particle{one} --smooth 1"), vec!["smooth: expected", "colour is needed"]),
-        (format!("--method particle{one} --particles 3"), vec!["particles: expected at least"]),
+        (format!("--method particle{one} --n-particles 3"), vec!["n_particles: expected at least"]),
         (format!("--method particle{one} --mot a.txt --csv a.txt"), vec!["csv: expected a file of its own"]),
         (format!("--method particle{one} --mot first.csv"), vec!["mot: expected", "first.csv"]),
         (format!("--method particle{one} --foreground maps.png"), vec!["foreground: expected a folder"]),
-        ("--method particle --box 900,5,20,30".into(), vec!["box: expected", "target 1"]),
+        ("--method particle --bbox 900,5,20,30".into(), vec!["bbox: expected", "target 1"]),
         (format!("--luminance{one} --foreground maps"), vec!["foreground: expected", "--method particle"]),
         (format!("--luminance{one} --random-state 3"), vec!["random_state: expected", "stereo or particle"]),
     ] {
@@ -152,7 +152,7 @@ fn grey_frames_say_that_colour_is_needed() {
     let mut sink = open_sink(&place.path("grey").to_string_lossy(), 25.0).unwrap();
     (0..2).for_each(|level| sink.write(&AnyFrame::U8(Frame::filled(64, 48, level))).unwrap());
     sink.finish().unwrap();
-    let ended = place.line("track grey --method particle --box 4,4,20,20");
+    let ended = place.line("track grey --method particle --bbox 4,4,20,20");
     assert!(ended.code != 0 && ended.err.contains("colour is needed"), "{}", ended.err);
 }
 

@@ -79,7 +79,7 @@ fn median(place: &Place, name: &str, format: DisparityFormat) -> f32 {
 #[test]
 fn every_layout_gives_the_same_disparities() {
     let place = recorded(3);
-    let common = "--disparities -8,12 --format npz,pfm,kitti --json";
+    let common = "--disparity-range -8,12 --format npz,pfm,kitti --json";
     for (folder, line) in [
         ("a", "stereo left right"),
         ("b", "stereo beside.y4m --layout side-by-side"),
@@ -132,7 +132,7 @@ fn squeezed_sequences_have_the_disparities_of_whole_ones() {
             }
         }
         fs::write(place.path("sequence.y4m"), sequence).unwrap();
-        place.good(&format!("stereo sequence.y4m --layout {name} --disparities -8,12 -o {name}"));
+        place.good(&format!("stereo sequence.y4m --layout {name} --disparity-range -8,12 -o {name}"));
         for index in 0..2 {
             let file = format!("{name}/disparity_{index:06}.npz");
             let found = median(&place, &file, DisparityFormat::Npz);
@@ -162,8 +162,8 @@ fn rows_are_found_however_a_sequence_begins() {
                 [left, lower]
             }
         });
-        for command in ["stereo left right -o o", "track left right --method stereo --components 4 -o t.csv"] {
-            let summary = place.good(&format!("{command} --disparities -8,12 --json")).json();
+        for command in ["stereo left right -o o", "track left right --method stereo --n-components 4 -o t.csv"] {
+            let summary = place.good(&format!("{command} --disparity-range -8,12 --json")).json();
             assert!((summary["row_offset"].as_f64().unwrap() - 2.0).abs() < 0.05, "{command}: {summary}");
         }
         for index in 1..4 {
@@ -189,24 +189,24 @@ fn rows_beyond_those_that_are_searched_are_reported() {
         "stereo left right --method classes -o b",
         "track left right --method stereo -o t.csv",
     ] {
-        let line = format!("{command} --disparities -8,12");
+        let line = format!("{command} --disparity-range -8,12");
         let ended = place.good(&line);
         assert!(
-            ended.err.contains("the views of 2 pairs hardly agree with any row offset"),
+            ended.err.contains("the views of 2 pairs agree poorly with every row offset"),
             "{command}: {}",
             ended.err
         );
         let summary = place.good(&format!("{line} --force --json")).json();
         assert_eq!(summary["rows_doubtful"].as_u64(), Some(2), "{summary}");
-        let wide = place.good(&format!("{line} --force --rows -12,12"));
-        assert!(!wide.err.contains("hardly agree"), "{command}: {}", wide.err);
+        let wide = place.good(&format!("{line} --force --row-range -12,12"));
+        assert!(!wide.err.contains("agree poorly"), "{command}: {}", wide.err);
     }
 }
 
 #[test]
 fn classes_give_whole_pixels_and_pictures_show_them() {
     let place = recorded(3);
-    let line = "stereo left right --method classes --disparities -8,12 --start 1 --stop 2 -o d.pfm --picture p";
+    let line = "stereo left right --method classes --disparity-range -8,12 --start 1 --stop 2 -o d.pfm --picture p";
     let ended = place.good(line);
     assert!(ended.err.contains("1 pairs") && ended.out.is_empty(), "{}", ended.err);
     let map = DisparityFormat::Pfm.read(&place.path("d.pfm")).unwrap();
@@ -225,7 +225,7 @@ fn classes_give_whole_pixels_and_pictures_show_them() {
 fn semi_global_matching_gives_whole_pixels_when_asked() {
     let place = recorded(1);
     let fractions = |option: &str| {
-        let line = format!("stereo left right --disparities -8,12 --row-offset 0 -o d.pfm --force {option}");
+        let line = format!("stereo left right --disparity-range -8,12 --row-offset 0 -o d.pfm --force {option}");
         place.good(&line);
         let map = DisparityFormat::Pfm.read(&place.path("d.pfm")).unwrap().disparity;
         let found = map.data().iter().filter(|d| d.is_finite());
@@ -240,7 +240,7 @@ fn semi_global_matching_gives_whole_pixels_when_asked() {
 #[test]
 fn an_interrupted_run_leaves_whole_files_only() {
     let place = Place::new();
-    let line = "stereo - --layout top-bottom --disparities -8,12 -o out --format npz,pfm --json";
+    let line = "stereo - --layout top-bottom --disparity-range -8,12 -o out --format npz,pfm --json";
     let mut command = place.command(&line.split_whitespace().collect::<Vec<_>>());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
@@ -274,7 +274,7 @@ fn an_interrupted_run_leaves_whole_files_only() {
 #[test]
 fn disparities_that_a_format_cannot_hold_are_reported() {
     let place = recorded(1);
-    let ended = place.good("stereo right left --disparities -8,8 -o d.png --row-offset 0");
+    let ended = place.good("stereo right left --disparity-range -8,8 -o d.png --row-offset 0");
     assert!(ended.err.contains("do not fit the kitti format"), "{}", ended.err);
 }
 
@@ -290,8 +290,8 @@ fn mistakes_are_named_and_leave_nothing() {
         ("stereo left right --layout top-bottom -o o", &["input", "one input"]),
         ("stereo left right", &["output", "--picture"]),
         ("stereo left right -o o --method magic", &["method", "sgm"]),
-        ("stereo left right -o o --disparities 3", &["--disparities"]),
-        ("stereo left right -o o --disparities -4000,4000", &["disparity_range"]),
+        ("stereo left right -o o --disparity-range 3", &["--disparity-range"]),
+        ("stereo left right -o o --disparity-range -4000,4000", &["disparity_range"]),
         ("stereo left right -o o --row-offset nan", &["row_offset"]),
         ("stereo left right -o o --threshold 0", &["threshold"]),
         ("stereo left right -o o --format flo", &["format", "npz"]),

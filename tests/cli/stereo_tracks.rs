@@ -16,7 +16,7 @@ fn moving(index: usize) -> [Vec<u8>; 2] {
 }
 
 /// Options for views as small as these.
-const SMALL: &str = "--method stereo --disparities -8,8 --components 4";
+const SMALL: &str = "--method stereo --disparity-range -8,8 --n-components 4";
 
 #[test]
 fn every_layout_gives_the_same_tracks() {
@@ -126,13 +126,13 @@ fn mistakes_about_tracks_of_views_are_named_and_leave_nothing() {
     let before = place.names(".");
     for (options, words) in [
         ("left --method stereo", &["input", "--layout"][..]),
-        ("left right --method stereo --box 1,2,3,4", &["box", "gradient"]),
+        ("left right --method stereo --bbox 1,2,3,4", &["bbox", "gradient"]),
         ("left right --method stereo --model affine", &["model", "gradient"]),
         ("left.y4m --mode improved", &["mode", "stereo and particle"]),
         ("left.y4m --graph g.png", &["graph", "stereo"]),
         ("left.y4m --layout side-by-side", &["layout", "stereo"]),
-        ("left right --method stereo --components 0", &["n_components"]),
-        ("left right --method stereo --disparities -4000,4000", &["disparity_range"]),
+        ("left right --method stereo --n-components 0", &["n_components"]),
+        ("left right --method stereo --disparity-range -4000,4000", &["disparity_range"]),
         ("left right --method stereo --cameras 3", &["--cameras"]),
         ("left right --method stereo --grid 30", &["--grid", "ROWS,COLUMNS"]),
         ("left right --method stereo --grid 0,40", &["grid", "1 to 4096"]),
@@ -145,7 +145,7 @@ fn mistakes_about_tracks_of_views_are_named_and_leave_nothing() {
         ("left right --method stereo -o t.txt", &["output", ".csv or .json"]),
         ("left right --method stereo -o old.csv", &["output", "--force"]),
         ("left right --method stereo -o - --json", &["output", "--json"]),
-        ("left right --method stereo --stop 1 -o t.csv --disparities -8,8", &["stop", "at least 2"]),
+        ("left right --method stereo --stop 1 -o t.csv --disparity-range -8,8", &["stop", "at least 2"]),
         ("left beside.y4m --method stereo -o t.csv", &["right", "(64, 96)", "(64, 192)"]),
     ] {
         let ended = place.line(&format!("track {options}"));

@@ -47,7 +47,7 @@ fn recorded(frames: usize) -> Place {
 }
 
 /// The square's box in the first frame: pixels 20 to 32 and 24 to 36.
-const BOX: &str = "--box 19.5,23.5,13,13";
+const BOX: &str = "--bbox 19.5,23.5,13,13";
 
 /// Rows of a table, by the names of its columns.
 fn rows(text: &str) -> Vec<std::collections::HashMap<String, String>> {
@@ -64,7 +64,7 @@ fn rows(text: &str) -> Vec<std::collections::HashMap<String, String>> {
 #[test]
 fn several_targets_become_rows_boxes_and_a_summary() {
     let place = recorded(6);
-    let ended = place.good(&format!("track s.y4m {BOX} --box 60,10,8,8 -o out --format csv,mot --json"));
+    let ended = place.good(&format!("track s.y4m {BOX} --bbox 60,10,8,8 -o out --format csv,mot --json"));
     let summary = ended.json();
     assert_eq!((summary["frames"].as_u64(), summary["files"].as_u64()), (Some(6), Some(2)));
     assert_eq!(summary["method"].as_str(), Some("gradient"));
@@ -94,7 +94,7 @@ fn several_targets_become_rows_boxes_and_a_summary() {
 #[test]
 fn a_moving_square_is_followed() {
     let place = recorded(20);
-    for start in [BOX, "--point 26,30", ""] {
+    for start in [BOX, "--center 26,30", ""] {
         let ended = place.good(&format!("track s.y4m {start} --quiet"));
         let table = rows(&ended.out);
         assert_eq!(table.len(), 20);
@@ -169,9 +169,9 @@ fn mistakes_are_named_and_leave_nothing() {
         ("track s.y4m --method magic", &["method", "gradient"]),
         ("track s.y4m --mode best", &["--mode", "improved"]),
         ("track s.y4m --mode improved", &["mode", "stereo and particle"]),
-        ("track s.y4m --box 1,2,3", &["--box"]),
-        ("track s.y4m --box 1,2,0,4", &["--box"]),
-        ("track s.y4m --point 1", &["--point"]),
+        ("track s.y4m --bbox 1,2,3", &["--bbox"]),
+        ("track s.y4m --bbox 1,2,0,4", &["--bbox"]),
+        ("track s.y4m --center 1", &["--center"]),
         ("track s.y4m --camera shaky", &["--camera"]),
         ("track s.y4m --model cubic", &["--model", "affine"]),
         ("track s.y4m -o out --format xml", &["format", "one of csv, mot"]),
@@ -317,7 +317,7 @@ fn rows_come_frame_by_frame_and_a_closed_pipe_ends_quietly() {
 fn any_number_of_threads_writes_the_same_bytes() {
     let place = recorded(5);
     let run = |threads: usize| -> Ended {
-        place.good(&format!("track s.y4m {BOX} --box 60,10,8,8 --point 40,40 --threads {threads} --quiet"))
+        place.good(&format!("track s.y4m {BOX} --bbox 60,10,8,8 --center 40,40 --threads {threads} --quiet"))
     };
     assert_eq!(run(1).out, run(2).out);
 }

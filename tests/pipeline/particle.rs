@@ -130,7 +130,7 @@ fn boxes_that_cannot_be_followed_are_named_and_leave_nothing() {
     let outside = TargetStart { bounds: TargetBox { x: 500.0, ..bounds(1, 0) }, ..start(5, 0) };
     let mut run = ParticleRun::new(&[outside], options(), Numbering::default());
     let error = run.run(source(3), Box::new(|| Ok(into(folder.path()))), &Silent).unwrap_err().to_string();
-    assert!(error.starts_with("box: expected") && error.ends_with("(target 5)"), "{error}");
+    assert!(error.starts_with("bbox: expected") && error.ends_with("(target 5)"), "{error}");
     assert_eq!(names(folder.path()), Vec::<String>::new());
     let one = ParticleRun::new(&[start(1, 0)], options(), Numbering::default()).run(
         source(1),

@@ -30,7 +30,7 @@ fn views(steps: usize) -> ViewPairs {
 fn run(steps: usize, begin: BeginSinks<'_>, threads: usize) -> (StereoSummary, Result<()>) {
     let threads = Threads::new(Some(threads)).unwrap();
     let mut options = StereoTrackerOptions::new(StereoMode::Improved).with_disparities([-8, 8]);
-    (options.components, options.threads, options.row_offset) = (4, threads, Some(0.0));
+    (options.n_components, options.threads, options.row_offset) = (4, threads, Some(0.0));
     let numbering = Numbering { start: 3, step: 2, rate: Some(10.0), ..Numbering::default() };
     let mut run = StereoRun::new(StereoTracker::new(options).unwrap(), numbering);
     let pairs = GreyPairs::start(views(steps), Preprocess::default(), threads).unwrap();

@@ -481,8 +481,8 @@ def test_a_sequence_gives_tracks(crossing, tmp_path):
 def test_files_are_those_of_the_command(crossing, tmp_path):
     frames = crossing.frames[:6]
     np.save(tmp_path / "sequence.npy", frames)
-    boxes = [argument for box in crossing.boxes[0] for argument in ("--box", ",".join(repr(float(side)) for side in box))]
-    command = [sys.executable, "-m", "jacoflow", "track", "sequence.npy", "--method", "particle", *boxes, "--particles", "100", "--mot", "a.txt", "--csv", "a.csv"]
+    boxes = [argument for box in crossing.boxes[0] for argument in ("--bbox", ",".join(repr(float(side)) for side in box))]
+    command = [sys.executable, "-m", "jacoflow", "track", "sequence.npy", "--method", "particle", *boxes, "--n-particles", "100", "--mot", "a.txt", "--csv", "a.csv"]
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
     tracks = track_particles(frames, dict(enumerate(crossing.boxes[0], start=1)), **FEW)
     tracks.save_mot(tmp_path / "b.txt")

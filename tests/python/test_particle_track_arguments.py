@@ -100,7 +100,7 @@ def test_other_arguments_are_named():
         with pytest.raises(ValueError, match="^camera: expected an affine map"):
             tracker.update(FRAME, camera)
     for box in ([1, 2], [np.nan] * 4, [50, 50, 4, 4], None, "box"):
-        with pytest.raises(ValueError, match="^box: expected"):
+        with pytest.raises(ValueError, match="^bbox: expected"):
             tracker.add(box)
     for call in (tracker.remove, lambda id: tracker.add(BOX, id), tracker.step.particles):
         with pytest.raises(TypeError, match="^id: expected an integer, got 'a'"):

@@ -43,7 +43,7 @@ fn a_restored_gradient_tracker_goes_on_bit_for_bit() {
 fn a_restored_stereo_tracker_goes_on_bit_for_bit() {
     for mode in [StereoMode::Improved, StereoMode::Paper] {
         let options = StereoTrackerOptions::new(mode).with_disparities([-4, 8]);
-        let mut tracker = StereoTracker::new(StereoTrackerOptions { components: 4, ..options }).unwrap();
+        let mut tracker = StereoTracker::new(StereoTrackerOptions { n_components: 4, ..options }).unwrap();
         let mut copies = vec![StereoTracker::from_bytes(&tracker.to_bytes()).unwrap()];
         let view = |t: usize, shift: usize| {
             let whole = frame(t);

@@ -24,7 +24,7 @@ fn each_option_out_of_range_is_named() {
     assert!(with(|o| o.disparity_range = [0, 40]).starts_with("grid: "));
     assert!(StereoTrackerOptions::default().with_disparities([3, 3]).check().is_ok());
     for wrong in [0, 4097, 100_000] {
-        let options = StereoTrackerOptions { components: wrong, ..StereoTrackerOptions::default() };
+        let options = StereoTrackerOptions { n_components: wrong, ..StereoTrackerOptions::default() };
         let message = options.check().unwrap_err().to_string();
         assert!(message.starts_with("n_components: ") && message.contains("up to 4096"), "{message}");
     }

@@ -36,7 +36,7 @@ impl Given {
         options.grid.layers = layers.unwrap_or(options.grid.layers);
         options.row_range = self.row_range;
         options.row_offset = self.row_offset;
-        options.components = self.n_components.unwrap_or(options.components);
+        options.n_components = self.n_components.unwrap_or(options.n_components);
         options.search = self.search;
         options.camera = self.camera.map(|(focal, baseline, d_infinity)| StereoCamera { focal, baseline, d_infinity });
         options.step_time = self.step_time;

@@ -46,9 +46,9 @@ pub fn parse_pair(text: &str) -> Result<(f64, f64), String> {
 pub fn parse_range(text: &str) -> Result<(i32, i32), String> {
     let ends = text.split_once(',').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
     match ends {
-        Some((least, greatest)) if least > greatest => Err(format!("expected the least first, {greatest},{least}")),
+        Some((least, greatest)) if least > greatest => Err(format!("expected the minimum first, {greatest},{least}")),
         Some(ends) => Ok(ends),
-        None => Err("expected LEAST,GREATEST, two whole numbers".into()),
+        None => Err("expected MIN,MAX, two whole numbers".into()),
     }
 }
 

@@ -20,7 +20,7 @@ pub struct ParticleTrackerArguments {
     pub box_file: Option<PathBuf>,
     /// Particles of a target; twice as many while another target is near [default: 1000]
     #[arg(long, value_name = "N")]
-    pub particles: Option<usize>,
+    pub n_particles: Option<usize>,
     /// Write boxes in the form of the MOT challenge: a .txt file, or any other name
     #[arg(long, value_name = "FILE")]
     pub mot: Option<PathBuf>,
@@ -38,7 +38,7 @@ impl ParticleTrackerArguments {
     pub fn given(&self) -> Option<&'static str> {
         [
             self.box_file.as_ref().map(|_| "boxes"),
-            self.particles.map(|_| "particles"),
+            self.n_particles.map(|_| "n_particles"),
             self.mot.as_ref().map(|_| "mot"),
             self.csv.as_ref().map(|_| "csv"),
             self.foreground.as_ref().map(|_| "foreground"),
@@ -50,14 +50,14 @@ impl ParticleTrackerArguments {
     /// The options of the particle tracker.
     pub fn options(&self, mode: ParticleMode, random_state: Option<u64>, threads: Threads) -> Result<ParticleOptions> {
         let mut options = ParticleOptions { mode, threads, ..ParticleOptions::default() };
-        if let Some(particles) = self.particles {
+        if let Some(particles) = self.n_particles {
             options.n_particles = particles;
             options.n_near = particles.saturating_mul(2);
         }
         options.random_state = random_state.unwrap_or(options.random_state);
         options.check().map_err(|error| match error {
-            Error::Argument { argument: "n_particles" | "n_near", expected, got } => {
-                Error::Argument { argument: "particles", expected, got }
+            Error::Argument { argument: "n_near", expected, got } => {
+                Error::Argument { argument: "n_particles", expected, got }
             }
             other => other,
         })?;
@@ -68,7 +68,7 @@ impl ParticleTrackerArguments {
     /// `frames`: how many come, if that is known.
     pub fn starts(&self, given: &[TargetBox], numbering: Numbering, frames: Option<usize>) -> Result<Vec<TargetStart>> {
         match (&self.box_file, given) {
-            (None, []) => Err(Error::argument("box", "a --box for each target, or --boxes FILE", "none")),
+            (None, []) => Err(Error::argument("bbox", "a --bbox for each target, or --boxes FILE", "none")),
             (None, given) => {
                 let start =
                     |(id, bounds): (u64, &TargetBox)| TargetStart { frame: numbering.start, id, bounds: *bounds };
@@ -76,8 +76,8 @@ impl ParticleTrackerArguments {
             }
             (Some(path), []) => starts_in(path, numbering, frames),
             (Some(path), _) => {
-                let got = format!("{} beside --box", path.display());
-                Err(Error::argument("boxes", "either --box or --boxes, since both number the targets", got))
+                let got = format!("{} beside --bbox", path.display());
+                Err(Error::argument("boxes", "either --bbox or --boxes, since both number the targets", got))
             }
         }
     }
@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     fn arguments(box_file: Option<PathBuf>) -> ParticleTrackerArguments {
-        ParticleTrackerArguments { box_file, particles: None, mot: None, csv: None, foreground: None }
+        ParticleTrackerArguments { box_file, n_particles: None, mot: None, csv: None, foreground: None }
     }
 
     #[test]

@@ -18,7 +18,7 @@ pub struct StereoTrackerArguments {
     pub matches: SearchArguments,
     /// Components of the mixture [default: 16, paper 12]
     #[arg(long, value_name = "N")]
-    pub components: Option<usize>,
+    pub n_components: Option<usize>,
     /// Cells along y and x over the picture and layers of disparity [default: 60,80 and a layer for each
     /// disparity]
     #[arg(long, value_name = "ROWS,COLUMNS[,LAYERS]", value_parser = parse_grid)]
@@ -48,7 +48,7 @@ impl StereoTrackerArguments {
     /// Whether any was given.
     pub fn given(&self) -> Option<&'static str> {
         let own = [
-            self.components.map(|_| "components"),
+            self.n_components.map(|_| "n_components"),
             self.grid.map(|_| "grid"),
             self.search.map(|_| "search"),
             self.cameras.map(|_| "cameras"),
@@ -67,14 +67,14 @@ impl StereoTrackerArguments {
         threads: Threads,
     ) -> Result<StereoTrackerOptions> {
         let mut options = StereoTrackerOptions::new(mode);
-        if let Some((least, greatest)) = self.matches.disparities {
+        if let Some((least, greatest)) = self.matches.disparity_range {
             options = options.with_disparities([least, greatest]);
         }
-        if let Some((least, greatest)) = self.matches.rows {
+        if let Some((least, greatest)) = self.matches.row_range {
             options.row_range = [least, greatest];
         }
         options.row_offset = self.matches.row_offset;
-        options.components = self.components.unwrap_or(options.components);
+        options.n_components = self.n_components.unwrap_or(options.n_components);
         if let Some(CellGrid { rows, columns, layers }) = self.grid {
             options.grid.rows = rows;
             options.grid.columns = columns;

@@ -14,18 +14,18 @@ use clap::{Args, ValueEnum};
 pub struct TargetArguments {
     /// A target's box in the first frame, px: left and upper side, width, height, where pixel k reaches from
     /// k - 1/2 to k + 1/2; may be repeated
-    #[arg(long = "box", value_name = "X,Y,WIDTH,HEIGHT", value_parser = parse_box, allow_hyphen_values = true)]
+    #[arg(long = "bbox", value_name = "X,Y,WIDTH,HEIGHT", value_parser = parse_box, allow_hyphen_values = true)]
     pub boxes: Vec<TargetBox>,
     /// A point on a target in the first frame, px: what moves nearest to it is followed; may be repeated.
     /// Targets are numbered from 1, boxes first
-    #[arg(long = "point", value_name = "X,Y", value_parser = parse_point, allow_hyphen_values = true)]
+    #[arg(long = "center", value_name = "X,Y", value_parser = parse_point, allow_hyphen_values = true)]
     pub points: Vec<[f64; 2]>,
 }
 
 impl TargetArguments {
     /// Whether any was given.
     pub fn given(&self) -> Option<&'static str> {
-        self.boxes.first().map(|_| "box").or(self.points.first().map(|_| "point"))
+        self.boxes.first().map(|_| "bbox").or(self.points.first().map(|_| "center"))
     }
 
     /// What is known of each target; without any, the one that moves first.

@@ -61,12 +61,12 @@ impl LayoutArguments {
 /// Where matches are looked for.
 #[derive(Debug, Clone, Args)]
 pub struct SearchArguments {
-    /// Least and greatest disparity, px [default: -40,24]
-    #[arg(long, value_name = "LEAST,GREATEST", allow_hyphen_values = true, value_parser = parse_range)]
-    pub disparities: Option<(i32, i32)>,
-    /// Least and greatest row offset that are searched, rows [default: -4,4]
-    #[arg(long, value_name = "LEAST,GREATEST", allow_hyphen_values = true, value_parser = parse_range)]
-    pub rows: Option<(i32, i32)>,
+    /// Minimum and maximum disparity, px [default: -40,24]
+    #[arg(long, value_name = "MIN,MAX", allow_hyphen_values = true, value_parser = parse_range)]
+    pub disparity_range: Option<(i32, i32)>,
+    /// Minimum and maximum row offset that are searched, rows [default: -4,4]
+    #[arg(long, value_name = "MIN,MAX", allow_hyphen_values = true, value_parser = parse_range)]
+    pub row_range: Option<(i32, i32)>,
     /// How many rows lower the right view shows a point [default: estimated from the first pair that shows
     /// enough, and again where views contradict it (sgm), searched at every pixel (classes)]
     #[arg(long, value_name = "ROWS")]
@@ -76,7 +76,7 @@ pub struct SearchArguments {
 impl SearchArguments {
     /// Whether any was given.
     pub fn given(&self) -> Option<&'static str> {
-        let rows = self.rows.map(|_| "rows").or(self.row_offset.map(|_| "row_offset"));
-        self.disparities.map(|_| "disparities").or(rows)
+        let rows = self.row_range.map(|_| "row_range").or(self.row_offset.map(|_| "row_offset"));
+        self.disparity_range.map(|_| "disparity_range").or(rows)
     }
 }

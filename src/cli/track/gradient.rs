@@ -75,19 +75,18 @@ impl TrackCommand {
 /// A tracker for each target.
 fn trackers(frame: &Frame<f64>, starts: &[Start], options: &GradientOptions) -> Result<Vec<Box<dyn Tracker>>> {
     let begin = |(index, start): (usize, &Start)| -> Result<Box<dyn Tracker>> {
-        let tracker = GradientTracker::new(frame, *start, options).map_err(|error| in_our_words(error, index + 1))?;
+        let tracker = GradientTracker::new(frame, *start, options).map_err(|error| of_target(error, index + 1))?;
         Ok(Box::new(tracker))
     };
     starts.iter().enumerate().map(begin).collect()
 }
 
-/// An error of a tracker with this command's names of the arguments and the target that it is about.
-fn in_our_words(error: Error, target: usize) -> Error {
-    let named =
-        |ours, expected, got| Error::Argument { argument: ours, expected, got: format!("{got} (target {target})") };
+/// An error of a tracker's start with the target that it is about.
+fn of_target(error: Error, target: usize) -> Error {
     match error {
-        Error::Argument { argument: "bbox", expected, got } => named("box", expected, got),
-        Error::Argument { argument: "center", expected, got } => named("point", expected, got),
+        Error::Argument { argument: argument @ ("bbox" | "center"), expected, got } => {
+            Error::Argument { argument, expected, got: format!("{got} (target {target})") }
+        }
         other => other,
     }
 }

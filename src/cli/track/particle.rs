@@ -14,7 +14,7 @@ use std::path::PathBuf;
 impl TrackCommand {
     /// Runs the command with the particle tracker.
     pub(super) fn follow_by_particles(&self, watch: &Watch) -> Result<Report> {
-        self.refuse(self.targets.points.first().map(|_| "point").or(self.tracker.given()), "gradient")?;
+        self.refuse(self.targets.points.first().map(|_| "center").or(self.tracker.given()), "gradient")?;
         self.refuse(self.stereo.given(), "stereo")?;
         self.refuse_changes_of_grey()?;
         let mode = self.tracker.particle_mode();

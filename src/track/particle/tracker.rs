@@ -217,7 +217,7 @@ impl ParticleTracker {
         }
         let (w, h) = self.size;
         let expected = format!("left, top, width and height of a box with an area inside the {w} x {h} picture");
-        Err(Error::argument("box", expected, crate::error::numbers(&[x, y, width, height])))
+        Err(Error::argument("bbox", expected, crate::error::numbers(&[x, y, width, height])))
     }
 
     fn report(&self, camera: &CameraMotion, predictions: &[Prediction], cause: StepCause) -> ParticleStep {
@@ -344,7 +344,7 @@ impl ParticleTracker {
 /// The error of one of the boxes given at the beginning.
 fn of_boxes(error: Error, id: u64) -> Error {
     match error {
-        Error::Argument { argument: "box", expected, got } => {
+        Error::Argument { argument: "bbox", expected, got } => {
             Error::Argument { argument: "boxes", expected, got: format!("{got} for target {id}") }
         }
         other => other,

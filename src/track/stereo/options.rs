@@ -102,7 +102,7 @@ pub struct StereoTrackerOptions {
     /// at the first suitable step and monitored (`SemiGlobal`).
     pub row_offset: Option<f64>,
     /// Components of the mixture; default 12 (`paper`), 16 (`improved`).
-    pub components: usize,
+    pub n_components: usize,
     /// Seed of cold starts; default 0.
     pub random_state: u64,
     /// Search reach from one ordinary step to the next, cells and disparities; default 8. Grows with the gap,
@@ -133,7 +133,7 @@ impl StereoTrackerOptions {
             disparity_range: [-40, 24],
             row_range: [-4, 4],
             row_offset: None,
-            components: if improved { 16 } else { 12 },
+            n_components: if improved { 16 } else { 12 },
             random_state: 0,
             search: 8,
             camera: None,
@@ -168,7 +168,7 @@ impl StereoTrackerOptions {
 
     pub(super) fn mixture_options(&self, carried: bool, step: usize) -> MixtureOptions {
         MixtureOptions {
-            components: self.components,
+            components: self.n_components,
             weight_concentration_prior: WEIGHT_CONCENTRATION_PRIOR,
             mean_precision_prior: MEAN_PRECISION_PRIOR,
             mean_prior: None,

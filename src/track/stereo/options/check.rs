@@ -14,9 +14,9 @@ impl StereoTrackerOptions {
     /// [`Error::Argument`] naming the option.
     pub fn check(&self) -> Result<()> {
         self.matching_options(self.row_offset).check()?;
-        if !(1..=MAX_COMPONENTS).contains(&self.components) {
+        if !(1..=MAX_COMPONENTS).contains(&self.n_components) {
             let expected = format!("a positive integer up to {MAX_COMPONENTS}");
-            return Err(Error::argument("n_components", expected, self.components));
+            return Err(Error::argument("n_components", expected, self.n_components));
         }
         self.mixture_options(false, 0).check()?;
         let VoxelGrid { columns, rows, layers, .. } = self.grid;
