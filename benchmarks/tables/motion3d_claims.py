@@ -250,7 +250,7 @@ def rotations_alone(trials: int) -> Iterator[Row]:
             "got": round(float(np.mean(deviations)), 2),
         }
         yield {
-            "what": f"translational flow of {flow} sigma: share told as rotation_only",
+            "what": f"translational flow of {flow} sigma: share reported as rotation_only",
             "trials": trials,
             "asked": "",
             "got": round(float(np.mean(told)), 3),

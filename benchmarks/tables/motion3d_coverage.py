@@ -238,8 +238,8 @@ CASES: dict[str, dict[str, Callable[[int], Estimated]]] = {
         )
         for depth, u, half, n, noise_std in AROUND
     },
-    "mover": {"a thing that moves by itself, robust": mover},
-    "few": {"20 to 60 points, outliers, noise not told": few_points},
+    "mover": {"a moving object, robust": mover},
+    "few": {"20 to 60 points, outliers, unknown noise": few_points},
     "outliers": {
         f"{share:.0%} outliers, noise {noise:g} of the flow": (
             lambda seed, n=noise, s=share: outliers(seed, n, s)

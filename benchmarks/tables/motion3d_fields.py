@@ -114,7 +114,7 @@ def errors(trials: int = TRIALS, only: list[Method] | None = None) -> list[Row]:
                         "rooms": trials,
                         "mean error, deviations of a point": round(mean, 2),
                         "if independent": round(independent, 2),
-                        "too long, in units of what is told": round(longer, 2),
+                        "too long, in units of the stated error": round(longer, 2),
                     }
                 )
     return rows

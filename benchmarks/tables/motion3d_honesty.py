@@ -36,7 +36,7 @@ def _waves(shape: Array, rng: np.random.Generator) -> Array:
     return 1 + np.sin(shape @ waves.T + phases) @ sizes
 
 
-def _things(shape: Array, rng: np.random.Generator) -> Array:
+def _objects(shape: Array, rng: np.random.Generator) -> Array:
     """Four discs before a wall."""
     nu = np.full(len(shape), 0.5)
     for centre, radius, depth in zip(
@@ -58,7 +58,7 @@ def _street(shape: Array, rng: np.random.Generator) -> Array:
 DEPTHS: dict[str, Callable[[Array, np.random.Generator], Array]] = {
     "cloud": lambda shape, rng: rng.uniform(0.3, 1.7, len(shape)),
     "waves": _waves,
-    "discs": _things,
+    "discs": _objects,
     "street": _street,
 }
 """Inverse depths at places in [-1, 1]^2."""

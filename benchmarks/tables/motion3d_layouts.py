@@ -7,7 +7,7 @@ Directions are uniform on the sphere, rotations up to 0.05 rad/frame, noise 0.3 
 translational flow, 20 to 1000 points in a field of half width 0.2 to 1; depths are a cloud, waves, discs, a
 street or a wall with 3 % relief.
 
-- `things`: a moving object on a tenth to a third of the points, half as near again; noise .3 to 10 %, robust
+- `objects`: a moving object on a tenth to a third of the points, half as near again; noise .3 to 10 %, robust
   search.
 - `planes`: exact planes, noise of 1 % of the flow; the twin solution differs only in points behind the
   camera.
@@ -87,7 +87,7 @@ def estimated(seed: int, layout: str, ratio: float = 1.0) -> Estimated:
     )
 
 
-def thing(seed: int, ratio: float) -> Estimated:
+def moving_object(seed: int, ratio: float) -> Estimated:
     """A random scene with a moving object; robust."""
     rng = np.random.default_rng((seed, 35))
     half, n = rng.uniform(0.2, 1), int(np.exp(rng.uniform(np.log(60), np.log(1000))))
@@ -197,9 +197,9 @@ def cases(only: list[str] | None = None) -> dict[str, Callable[[int], Estimated]
             )
             for ratio in RATIOS
         },
-        "things": {
-            f"a thing that moves by itself, robust, axes of the noise {ratio:g} to 1": (
-                lambda seed, ratio=ratio: thing(seed, ratio)
+        "objects": {
+            f"a moving object, robust, axes of the noise {ratio:g} to 1": (
+                lambda seed, ratio=ratio: moving_object(seed, ratio)
             )
             for ratio in (1.0, 20.0, 100.0)
         },
@@ -207,7 +207,7 @@ def cases(only: list[str] | None = None) -> dict[str, Callable[[int], Estimated]
             f"a plane, axes of the noise {ratio:g} to 1": (lambda seed, ratio=ratio: plane(seed, ratio))
             for ratio in (1.0, 10.0, 30.0, 100.0)
         },
-        "band": {"a band of something nearly flat, 110 to 160 degrees wide": band},
+        "band": {"a nearly flat band, 110 to 160 degrees wide": band},
         "views": {
             f"two views, {depth}, noise {noise:g} of the displacement": (
                 lambda seed, depth=depth, noise=noise: views(seed, depth, noise)
@@ -242,7 +242,7 @@ TABLES = {
 ARGUMENTS = {
     "--cases": {
         "nargs": "+",
-        "choices": ["layouts", "noise", "things", "planes", "band", "views"],
+        "choices": ["layouts", "noise", "objects", "planes", "band", "views"],
         "help": "parts of the table",
     }
 }

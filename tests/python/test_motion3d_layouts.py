@@ -8,7 +8,7 @@ TRIALS = 150
 OTHERS = {
     "a ring": 100,
     "three lines": 100,
-    "a thing that moves by itself, robust, axes of the noise 100 to 1": 100,
+    "a moving object, robust, axes of the noise 100 to 1": 100,
     "two views, plane, noise 0.05 of the displacement": 100,
     "a plane, axes of the noise 100 to 1": 200,
 }
@@ -19,7 +19,7 @@ LESS = (
     *("waves, noise 0.03 of the displacement", "waves, noise 0.1 of the displacement", "cloud, noise 0.1 of the displacement", "plane, noise 0.01 of the displacement"),
 )
 """Ends of the names of rows left out: shorter axes of the noise, less of it, layouts and depths that are like others. A moving object in even noise is in `test_motion3d_points`."""
-ROWS = {part: [name for name in layouts.cases([part]) if not name.endswith(LESS)] for part in ("layouts", "noise", "things", "planes", "views")}
+ROWS = {part: [name for name in layouts.cases([part]) if not name.endswith(LESS)] for part in ("layouts", "noise", "objects", "planes", "views")}
 
 
 def coverage_of(name: str) -> dict:
@@ -34,7 +34,7 @@ def test_points_and_noise_of_any_layout_and_shape(name):
     assert row["ok"] >= 0.3 and row["wrong"] <= 1 / 150 and 0.89 <= row["ellipsoid"] <= 0.98, row
 
 
-@pytest.mark.parametrize("name", ROWS["things"])
+@pytest.mark.parametrize("name", ROWS["objects"])
 def test_what_an_object_and_the_scene_nearly_share_is_not_the_scene(name):
     """Some have another motion down to the noise; the longer its axes, the more."""
     row = coverage_of(name)

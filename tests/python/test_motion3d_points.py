@@ -179,8 +179,8 @@ def test_few_points_that_stand_still_are_reported(turn):
 
 HARD = {
     "long lens, half width .15 to .2": (100, 0.3),
-    "a thing that moves by itself, robust": (80, 0.5),
-    "20 to 60 points, outliers, noise not told": (100, 0.3),
+    "a moving object, robust": (80, 0.5),
+    "20 to 60 points, outliers, unknown noise": (100, 0.3),
     "6 patches with Jacobians": (140, 0.3),
     "30 patches with Jacobians": (100, 0.3),
 }

@@ -62,7 +62,7 @@ def test_what_the_text_says_besides_its_tables():
     # 80 to 85 %, less two deviations of 60 trials.
     assert float(str(got["5 exact points: the true motion picked"]["got"]).rstrip("%")) > 70
     for flow, share in ((0, 1), (2, 0)):
-        assert got[f"translational flow of {flow} sigma: share told as rotation_only"]["got"] == pytest.approx(share, abs=0.07)
+        assert got[f"translational flow of {flow} sigma: share reported as rotation_only"]["got"] == pytest.approx(share, abs=0.07)
     for flow in (1, 2):
         row = got[f"translational flow of {flow} sigma: deviations above noise"]
         assert row["got"] == pytest.approx(row["asked"], rel=0.25), row
