@@ -36,12 +36,14 @@ pub struct ParticleTrackerArguments {
 impl ParticleTrackerArguments {
     /// Whether any was given.
     pub fn given(&self) -> Option<&'static str> {
+        // Every field is named, so that a new option cannot be left out.
+        let Self { box_file, n_particles, mot, csv, foreground } = self;
         [
-            self.box_file.as_ref().map(|_| "boxes"),
-            self.n_particles.map(|_| "n_particles"),
-            self.mot.as_ref().map(|_| "mot"),
-            self.csv.as_ref().map(|_| "csv"),
-            self.foreground.as_ref().map(|_| "foreground"),
+            box_file.as_ref().map(|_| "boxes"),
+            n_particles.map(|_| "n_particles"),
+            mot.as_ref().map(|_| "mot"),
+            csv.as_ref().map(|_| "csv"),
+            foreground.as_ref().map(|_| "foreground"),
         ]
         .into_iter()
         .find_map(|given| given)

@@ -47,16 +47,18 @@ pub struct StereoTrackerArguments {
 impl StereoTrackerArguments {
     /// Whether any was given.
     pub fn given(&self) -> Option<&'static str> {
+        // Every field is named, so that a new option cannot be left out.
+        let Self { layout, matches, n_components, grid, search, cameras, times, disparity_overlay, graph } = self;
         let own = [
-            self.n_components.map(|_| "n_components"),
-            self.grid.map(|_| "grid"),
-            self.search.map(|_| "search"),
-            self.cameras.map(|_| "cameras"),
-            self.times.as_ref().map(|_| "times"),
-            self.disparity_overlay.as_ref().map(|_| "disparity_overlay"),
-            self.graph.as_ref().map(|_| "graph"),
+            n_components.map(|_| "n_components"),
+            grid.map(|_| "grid"),
+            search.map(|_| "search"),
+            cameras.map(|_| "cameras"),
+            times.as_ref().map(|_| "times"),
+            disparity_overlay.as_ref().map(|_| "disparity_overlay"),
+            graph.as_ref().map(|_| "graph"),
         ];
-        self.layout.given().or(self.matches.given()).or(own.into_iter().find_map(|given| given))
+        layout.given().or(matches.given()).or(own.into_iter().find_map(|given| given))
     }
 
     /// The options of the stereo tracker; layers of disparity as wide as the range.

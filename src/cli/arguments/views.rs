@@ -76,7 +76,8 @@ pub struct SearchArguments {
 impl SearchArguments {
     /// Whether any was given.
     pub fn given(&self) -> Option<&'static str> {
-        let rows = self.row_range.map(|_| "row_range").or(self.row_offset.map(|_| "row_offset"));
-        self.disparity_range.map(|_| "disparity_range").or(rows)
+        let Self { disparity_range, row_range, row_offset } = self;
+        let rows = row_range.map(|_| "row_range").or(row_offset.map(|_| "row_offset"));
+        disparity_range.map(|_| "disparity_range").or(rows)
     }
 }
