@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-MOST = 9
+MAX_PRINTED = 9
 """Numbers of an array that are printed themselves."""
 LONGEST = 60
 """Characters of any other value that are printed."""
@@ -31,8 +31,9 @@ class Rows(Brief):
     """Names of the arrays with N rows, in their units."""
 
     def table(self) -> dict[str, NDArray[Any]]:
-        """A column (N,) for each number of a row, as for `pandas.DataFrame(result.table())`, in the units of the
-        attributes; those of an array with several numbers a row end in their indices: `boxes_0` to `boxes_3`."""
+        """A column (N,) for each number of a row, as for `pandas.DataFrame(result.table())`, in the units of
+        the attributes; those of an array with several numbers a row end in their indices: `boxes_0` to
+        `boxes_3`."""
         return columns({name: getattr(self, name) for name in self._ROWS})
 
 
@@ -51,7 +52,7 @@ def columns(arrays: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
 
 def _shown(value: Any) -> str:
     if isinstance(value, np.ndarray):
-        if value.size > MOST:
+        if value.size > MAX_PRINTED:
             return f"<{value.shape} {value.dtype}>"
         return np.array2string(value, separator=", ", precision=4).replace("\n", "")
     if isinstance(value, float):

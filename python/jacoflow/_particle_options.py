@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 
 from ._checks import check_memory, is_word, numbers, real_number, word
 
-MOST_ID = 2**63 - 2
+MAX_ID = 2**63 - 2
 """Greatest number of a target, no unit."""
-MOST = {"random_state": 2**64 - 1, "threads": 2**31 - 1}
+LIMITS = {"random_state": 2**64 - 1, "threads": 2**31 - 1}
 """Greatest values, no unit, of integers that are not counts of particles."""
-MOST_PARTICLES = 10**8
-"""Most particles of a target, no unit: more would take all memory."""
+MAX_PARTICLES = 10**8
+"""Maximum number of particles of a target, no unit: more would take all memory."""
 BOX_BYTES = 256
 """Memory of a target's number and box as objects of Python, bytes."""
 WORDS = {
@@ -40,9 +40,9 @@ def checked(options: Mapping[str, Any]) -> dict[str, Any]:
     for name, expected in WORDS.items():
         word(name, out[name], expected)
     for name in ("n_particles", "n_near"):
-        out[name] = _integer(name, out[name], MOST_PARTICLES)
-    out["random_state"] = _integer("random_state", out["random_state"], MOST["random_state"])
-    out["threads"] = None if out["threads"] is None else _integer("threads", out["threads"], MOST["threads"])
+        out[name] = _integer(name, out[name], MAX_PARTICLES)
+    out["random_state"] = _integer("random_state", out["random_state"], LIMITS["random_state"])
+    out["threads"] = None if out["threads"] is None else _integer("threads", out["threads"], LIMITS["threads"])
     out["scale"] = None if out["scale"] is None else _real("scale", out["scale"])
     out["ess_threshold"] = _real("ess_threshold", out["ess_threshold"])
     out["likelihoods"] = None if out["likelihoods"] is None else _names("likelihoods", out["likelihoods"])
@@ -89,13 +89,13 @@ def _segmentation(value: Any) -> tuple[float, float, int | None]:
             raise ValueError(f"segmentation: expected scale, sigma and min_size, got {name!r}")
     entries = {**SEGMENTATION, **given}
     area = entries["min_size"]
-    least = None if area is None else _integer("segmentation", area, MOST["threads"])
+    least = None if area is None else _integer("segmentation", area, LIMITS["threads"])
     return _real("segmentation", entries["scale"]), _real("segmentation", entries["sigma"]), least
 
 
 def checked_id(value: Any) -> int:
     """A number of a target, no unit."""
-    return _integer("id", value, MOST_ID)
+    return _integer("id", value, MAX_ID)
 
 
 def checked_box(name: str, value: ArrayLike) -> list[float]:

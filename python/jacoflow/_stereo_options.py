@@ -1,4 +1,5 @@
-"""Options of edge disparities and of the stereo tracker, checked by name before the compiled part takes them."""
+"""Options of edge disparities and of the stereo tracker, checked by name before the compiled part takes
+them."""
 
 from __future__ import annotations
 
@@ -23,9 +24,9 @@ OPTIONAL = frozenset({"n_components", "threads", "row_offset"})
 """Names (no unit) of those that may be None."""
 
 
-MOST = {"random_state": 2**64 - 1, "prior_radius": 2**32 - 1, "disparity_range": 2**31 - 1, "row_range": 2**31 - 1}
-"""Greatest values, no unit, that the compiled part can hold, where they are not `MOST_ELSE`."""
-MOST_ELSE = 2**63 - 1
+LIMITS = {"random_state": 2**64 - 1, "prior_radius": 2**32 - 1, "disparity_range": 2**31 - 1, "row_range": 2**31 - 1}
+"""Greatest values, no unit, that the compiled part can hold, where they are not `DEFAULT_LIMIT`."""
+DEFAULT_LIMIT = 2**63 - 1
 """Greatest size of every other integer, no unit."""
 
 
@@ -36,7 +37,8 @@ class StereoCamera:
     Raises
     ------
     ValueError
-        For a length that is not above 0 or a disparity that is not finite, naming it; `TypeError` for no number.
+        For a length that is not above 0 or a disparity that is not finite, naming it; `TypeError` for no
+        number.
     """
 
     focal: float
@@ -57,7 +59,8 @@ class StereoCamera:
 
 
 def checked(options: Mapping[str, Any]) -> dict[str, Any]:
-    """The stereo tracker's options, each in the unit it had, as the compiled part takes them; what is of another kind, length or sign is refused by name."""
+    """The stereo tracker's options, each in the unit it had, as the compiled part takes them; what is of
+    another kind, length or sign is refused by name."""
     out = dict(options)
     word("mode", out["mode"], '"improved" or "paper"')
     if out["camera"] is not None and not isinstance(out["camera"], StereoCamera):
@@ -75,7 +78,8 @@ def checked(options: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def checked_views(left: ArrayLike, right: ArrayLike) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Both views as arrays, (H, W) or (H, W, 3) each; ValueError with both shapes where one is of another kind. The compiled part checks their sizes."""
+    """Both views as arrays, (H, W) or (H, W, 3) each; ValueError with both shapes where one is of another
+    kind. The compiled part checks their sizes."""
     views = as_array(left), as_array(right)
     for name, view in zip(("left", "right"), views, strict=True):
         if not (view.ndim == 2 or (view.ndim == 3 and view.shape[2] in (3, 4))):
@@ -108,16 +112,17 @@ def checked_matching(options: Mapping[str, Any]) -> dict[str, Any]:
 def warn_of_rows(row_range: tuple[int, int]) -> None:
     """Warns that the views disagree at each of these row offsets, px."""
     least, greatest = row_range
-    message = f"row_range: the views hardly agree with any row offset that was searched, {least} to {greatest}, and many disparities are wrong; widen the range or give row_offset"
+    message = f"row_range: the views agree poorly with every row offset that was searched, {least} to {greatest}, and many disparities are wrong; widen the range or give row_offset"
     warnings.warn(message, UserWarning, stacklevel=3)
 
 
 def whole_number(name: str, value: Any) -> int:
-    """An integer, in its unit, that the compiled part can hold; TypeError or ValueError by name for what is none."""
+    """An integer, in its unit, that the compiled part can hold; TypeError or ValueError by name for what is
+    none."""
     integer: int = converted(name, value, operator.index, "an integer")
-    most = MOST.get(name, MOST_ELSE)
-    if abs(integer) > most:
-        raise ValueError(f"{name}: expected an integer up to {most}, got {integer}")
+    limit = LIMITS.get(name, DEFAULT_LIMIT)
+    if abs(integer) > limit:
+        raise ValueError(f"{name}: expected an integer up to {limit}, got {integer}")
     return integer
 
 

@@ -24,8 +24,8 @@ from ._jacoflow import _felzenszwalb, _region_means
 
 __all__ = ["felzenszwalb", "region_means"]
 
-MOST_PIXELS = 2**30
-"""Most pixels of an image, px: any larger `min_size` means one region."""
+MAX_PIXELS = 2**30
+"""Maximum number of pixels of an image, px: any larger `min_size` means one region."""
 
 
 def felzenszwalb(
@@ -71,7 +71,7 @@ def felzenszwalb(
         smallest = operator.index(min_size)
     except TypeError:
         raise TypeError(f"min_size: expected an integer, got {min_size!r}") from None
-    return _felzenszwalb(image, scale, sigma, max(-MOST_PIXELS, min(smallest, MOST_PIXELS)), threads)
+    return _felzenszwalb(image, scale, sigma, max(-MAX_PIXELS, min(smallest, MAX_PIXELS)), threads)
 
 
 def region_means(labels: ArrayLike, values: ArrayLike) -> NDArray[np.float64]:

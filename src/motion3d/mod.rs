@@ -67,8 +67,8 @@ pub use field::{
 pub use lateral::{LateralBound, LateralEstimate, LateralWeights, estimate_lateral, lateral_bound};
 pub use model::input::{Flow, Noise, Placement};
 pub use model::motion::Motion;
-pub use model::options::{CommonErrors, Method, MotionOptions, RotationPrior};
+pub use model::options::{Method, MotionOptions, RotationPrior, SystematicErrors};
 pub use model::result::{
-    Alternative, CommonEffect, Likelihood, MotionEstimate, Status, UncertainMotion, focus_of_expansion,
+    Alternative, Likelihood, MotionEstimate, Status, SystematicEffect, UncertainMotion, focus_of_expansion,
 };
 pub use patches::{AffinePatches, estimate_patch_motion};

@@ -1,4 +1,5 @@
-"""Every public function and method with arguments that it accepts, of which some are replaced by hostile ones."""
+"""Every public function and method with arguments that it accepts, of which some are replaced by hostile
+ones."""
 
 import importlib
 import inspect
@@ -12,7 +13,7 @@ from jacoflow import filters, io, mixture, motion3d, plot, scenes, segment, ster
 import values
 
 MODULES = ["jacoflow", "jacoflow.io", "jacoflow.filters", "jacoflow.mixture", "jacoflow.motion3d", "jacoflow.plot", "jacoflow.scenes", "jacoflow.segment", "jacoflow.stereo", "jacoflow.track", "jacoflow.video"]  # fmt: skip
-RESULTS = {"CommonEffect", "EdgeDisparity", "FieldLike", "FrameReader", "GaussianFilter", "LateralBound", "LateralEstimate", "MotionBound", "MotionEstimate", "MotionSolution", "MovingTarget", "Observability", "ObservabilityMap", "ParticleCorners", "ParticleStep", "ParticleTrack", "ParticleTracks", "StereoCluster", "StereoStep", "StereoTrack", "Track", "TrackResult"}  # fmt: skip
+RESULTS = {"EdgeDisparity", "FieldLike", "FrameReader", "GaussianFilter", "LateralBound", "LateralEstimate", "MotionBound", "MotionEstimate", "MotionSolution", "MovingTarget", "Observability", "ObservabilityMap", "ParticleCorners", "ParticleStep", "ParticleTrack", "ParticleTracks", "StereoCluster", "StereoStep", "StereoTrack", "SystematicEffect", "Track", "TrackResult"}  # fmt: skip
 """Classes that only the library makes."""
 ENUMERATIONS = {"Condition", "Status"}
 

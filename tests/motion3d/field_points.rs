@@ -20,7 +20,7 @@ fn points_are_as_far_apart_as_errors_go_together() {
     let points = field_points(&field, &FieldOptions::default()).unwrap();
     assert_eq!((points.spacing, points.points.len()), (10.0, 24));
     assert_eq!((points.points[0], points.points[1], points.flow[3]), ([5.0, 5.0], [15.0, 5.0], [0.5, 0.5]));
-    let few = FieldOptions { most: Some(7), ..FieldOptions::default() };
+    let few = FieldOptions { max_points: Some(7), ..FieldOptions::default() };
     assert_eq!(field_points(&field, &few).unwrap().points.len(), 6);
     let dense = FieldOptions { spacing: Some(5.0), ..FieldOptions::default() };
     let covariance = field_points(&field, &dense).unwrap().covariances[0];
@@ -46,7 +46,7 @@ fn a_region_has_its_own_grid_and_its_own_most() {
     assert!(found.points.len() >= 30 && found.spacing < 10.0, "{} {}", found.points.len(), found.spacing);
     assert!(found.covariances[0] > 0.25);
     // As many as are wanted in the region, regardless of the rest of the field.
-    let few = inside(FieldOptions { region, most: Some(12), ..FieldOptions::default() });
+    let few = inside(FieldOptions { region, max_points: Some(12), ..FieldOptions::default() });
     assert!((9..=12).contains(&few.points.len()), "{}", few.points.len());
     let rest = inside(FieldOptions { excluded: region, ..FieldOptions::default() });
     assert_eq!((rest.points.len(), rest.flow.len(), rest.covariances.len()), (12, 12, 48));

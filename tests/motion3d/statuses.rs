@@ -68,3 +68,18 @@ fn thirty_points_are_enough_for_smoothed_weights() {
         }
     }
 }
+
+/// The lists of words beside the enum.
+#[test]
+fn statuses_are_listed_in_the_page_in_python_and_in_the_help() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |name: &str| std::fs::read_to_string(root.join(name)).unwrap();
+    let help = read("src/cli/egomotion.rs");
+    let help = help.lines().find(|line| line.trim_start().starts_with("status: ")).unwrap();
+    let (page, python) = (read("docs/motion3d.md"), read("python/jacoflow/motion3d/_results.py"));
+    for name in Status::ALL.map(Status::name) {
+        assert!(page.contains(&format!("| `{name}` |")), "docs/motion3d.md: {name}");
+        assert!(python.contains(&format!("\"{name}\"")), "_results.py: {name}");
+        assert!(help.contains(name), "egomotion --help: {name}");
+    }
+}

@@ -1,6 +1,6 @@
 //! Times to contact of fields and points whose depths are known.
 
-use super::motion3d::{CommonEffect, Intrinsics, UncertainMotion, contact_map};
+use super::motion3d::{Intrinsics, SystematicEffect, UncertainMotion, contact_map};
 use super::scenes::{Scene, smooth};
 use super::{Motion, MotionOptions, Noise, Placement, empty_field, estimate_motion};
 use jacoflow::types::{FlowField, Status};
@@ -33,7 +33,8 @@ fn a_wall_is_reached_everywhere_at_once() {
     field.motion[100] += 5.0;
     let mut covariance = [[0.0; 5]; 5];
     let map = |motion: Motion, covariance: [[f64; 5]; 5]| {
-        let known = UncertainMotion { motion, tangent: TANGENT, covariance, common: CommonEffect::default() };
+        let known =
+            UncertainMotion { motion, tangent: TANGENT, covariance, systematic_errors: SystematicEffect::default() };
         contact_map(&field, &camera, &known, Placement::Start).unwrap()
     };
     let exact = map(motion, covariance);

@@ -36,7 +36,7 @@ def results():
     return {
         "estimate": estimate,
         "solution": estimate.ml,
-        "common": estimate.common_errors,
+        "common": estimate.systematic_errors,
         "bound": motion3d.motion_bound(scene.points, scene.u, scene.w, scene.depths, noise_std=0.01),
         "lateral": motion3d.estimate_lateral(scene.flow),
         "track": track.track(frames, (19.5, 23.5, 24, 24)),

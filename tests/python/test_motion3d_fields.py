@@ -79,7 +79,7 @@ def test_a_map_has_the_errors_that_all_flow_has_in_common(common, form):
     x, y = np.round(points).astype(int).T
     _, deviation, _ = motion3d.time_to_contact_map(field, found, camera)
     assert np.nanmedian(deviation[y, x] / found.time_to_contact_std) == pytest.approx(1, abs=0.3 if "patches" in form else 0.1)
-    known = found.common_errors
+    known = found.systematic_errors
     assert_allclose(np.linalg.eigvalsh(found.covariance - known.motion.T @ known.motion) > 0, True)
     (name, value), = common.items()
     if name == "flow_scale_std":
@@ -138,7 +138,8 @@ CAMERA = np.array([[500.0, 0, 160], [0, 500, 120], [0, 0, 1]])
 
 
 def two_views(seed, noise):
-    """Two frames of a smooth textured scene, f = 500 px, 320 x 240 px, and the motion of the scene between them: exact, as points of the first view move to the second."""
+    """Two frames of a smooth textured scene, f = 500 px, 320 x 240 px, and the motion of the scene between
+    them: exact, as points of the first view move to the second."""
     rng = np.random.default_rng(seed)
     u = np.array([0.6, 0.2, 0.75]) + 0.2 * rng.normal(size=3)
     u, w = u / np.linalg.norm(u), 0.002 * rng.normal(size=3)

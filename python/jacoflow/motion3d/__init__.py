@@ -1,8 +1,12 @@
-"""Rigid 3-D motion from noisy optical flow, with an honest covariance and the bound that no estimator can beat.
+"""Rigid 3-D motion from noisy optical flow, with an honest covariance and the bound that no estimator can
+beat.
 
-One translation direction `u` (`|u| = 1`), one rotation rate `w` and an inverse depth `nu` for every point explain the flow: `f = nu G u + R w`. `u` and `w` are the motion of the scene relative to the camera, `X' = u + w x X`
-(the camera itself moves by `-u`); camera axes are x right, y down, z forward; inverse depths are in units of `|u|` per frame. Source: T. Endoh, T. Toriu, N. Tagawa, "The Maximum Likelihood Estimator is Not 'Optimal' on 3-D Motion
-Estimation from Noisy Optical Flow" (equation numbers below), and smoothed weights beyond it.
+One translation direction `u` (`|u| = 1`), one rotation rate `w` and an inverse depth `nu` for every point
+explain the flow: `f = nu G u + R w`. `u` and `w` are the motion of the scene relative to the camera, `X' = u
++ w x X` (the camera itself moves by `-u`); camera axes are x right, y down, z forward; inverse depths are in
+units of `|u|` per frame. Source: T. Endoh, T. Toriu, N. Tagawa, "The Maximum Likelihood Estimator is Not
+'Optimal' on 3-D Motion Estimation from Noisy Optical Flow" (equation numbers below), and smoothed weights
+beyond it.
 
 >>> import numpy as np
 >>> from jacoflow import motion3d
@@ -18,15 +22,15 @@ Estimation from Noisy Optical Flow" (equation numbers below), and smoothed weigh
 from ._bound import MotionBound, motion_bound
 from ._estimate import estimate_motion
 from ._field import estimate_field_motion, time_to_contact_map
-from ._results import CommonEffect, MotionEstimate, MotionSolution, focus_of_expansion, time_to_contact, time_to_contact_std
+from ._results import MotionEstimate, MotionSolution, SystematicEffect, focus_of_expansion, time_to_contact, time_to_contact_std
 from ._lateral import LateralBound, LateralEstimate, estimate_lateral, lateral_bound
 from ._two_views import essential_matrix, predict_flow
 
 __all__ = [
-    "CommonEffect",
     "MotionBound",
     "MotionEstimate",
     "MotionSolution",
+    "SystematicEffect",
     "LateralBound",
     "LateralEstimate",
     "essential_matrix",

@@ -20,13 +20,15 @@ class MotionBound(Brief):
     crlb: Array
     """The Cramer-Rao bound (5, 5) (8), (9), rad and rad/frame."""
     ml_covariance: Array
-    """Maximum likelihood's covariance (5, 5) (17), (24), rad and rad/frame: the bound and a term of fourth order in the noise."""
+    """Maximum likelihood's covariance (5, 5) (17), (24), rad and rad/frame: the bound and a term of fourth
+    order in the noise."""
     ideal_covariance: Array
     """Covariance (5, 5) with ideal weights (25), rad and rad/frame."""
     tangent: Array
     """Axes (2, 3) of psi, no unit."""
     direction_std: Array
-    """Standard deviations (3,) of the direction in units of degrees: of the bound, of maximum likelihood, of ideal weights."""
+    """Standard deviations (3,) of the direction in units of degrees: of the bound, of maximum likelihood, of
+    ideal weights."""
 
 
 def motion_bound(
@@ -41,7 +43,8 @@ def motion_bound(
     jacobian: bool = False,
     projection: Literal["plane", "sphere"] = "plane",
 ) -> MotionBound:
-    """Predicted covariances of a motion from flow at these points: for the design of an experiment, before anything is measured.
+    """Predicted covariances of a motion from flow at these points: for the design of an experiment, before
+    anything is measured.
 
     Parameters
     ----------
@@ -65,7 +68,8 @@ def motion_bound(
     Raises
     ------
     ValueError
-        For shapes and values that do not fit, noise that is not given or given twice, and fewer than 5 points (2 with `jacobian`) that are finite.
+        For shapes and values that do not fit, noise that is not given or given twice, and fewer than 5 points
+        (2 with `jacobian`) that are finite.
     NotObservableError
         When the points do not determine the motion, as points at one place.
     """

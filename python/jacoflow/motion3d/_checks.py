@@ -1,4 +1,5 @@
-"""Kinds of arguments, checked before they reach the compiled module, which checks their values: each message names the argument."""
+"""Kinds of arguments, checked before they reach the compiled module, which checks their values: each message
+names the argument."""
 
 from __future__ import annotations
 

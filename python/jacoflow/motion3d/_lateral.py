@@ -1,4 +1,5 @@
-"""A translation along the image plane without a rotation: section 5 of the paper, one unknown angle in closed forms."""
+"""A translation along the image plane without a rotation: section 5 of the paper, one unknown angle in closed
+forms."""
 
 from __future__ import annotations
 
@@ -17,18 +18,22 @@ __all__ = ["LateralBound", "LateralEstimate", "estimate_lateral", "lateral_bound
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LateralEstimate(Brief):
-    """The direction of a translation along the image plane, an angle in rad, with its variance and the inverse depths (N,)."""
+    """The direction of a translation along the image plane, an angle in rad, with its variance and the
+    inverse depths (N,)."""
 
     angle: float
-    """Angle `psi` of `u = (cos psi, sin psi, 0)`, rad, of the scene relative to the camera; by the sign of the depths, most of which are positive."""
+    """Angle `psi` of `u = (cos psi, sin psi, 0)`, rad, of the scene relative to the camera; by the sign of
+    the depths, most of which are positive."""
     variance: float
-    """Variance of `angle`, rad^2: (29), (31) or that of shrunk weights, with the moments of the depths less their noise; infinite where noise explains all of the flow."""
+    """Variance of `angle`, rad^2: (29), (31) or that of shrunk weights, with the moments of the depths less
+    their noise; infinite where noise explains all of the flow."""
     crlb: float
     """The Cramér-Rao bound `sigma^2 / (n m2)` with the same moments, rad^2."""
     noise_std: float
     """Standard deviation of each component of the flow, units of flow: as given, else estimated."""
     inv_depth: NDArray[np.float64]
-    """Inverse depths (N,), units of |u| per frame: the flow along the direction, each with the deviation `noise_std`. NaN where the flow is not finite."""
+    """Inverse depths (N,), units of |u| per frame: the flow along the direction, each with the deviation
+    `noise_std`. NaN where the flow is not finite."""
 
     @property
     def translation(self) -> NDArray[np.float64]:
@@ -54,13 +59,17 @@ class LateralBound(Brief):
     shrunk_variance: float
     """Shrunk weights, rad^2: `sigma^2 / (n [mean^2 + var^2 / (var + sigma^2)])`, below both."""
     crossover: float
-    """Noise, units of flow, above which weights of 1 beat maximum likelihood: `sqrt(m2) std(nu) / |mean(nu)|`."""
+    """Noise, units of flow, above which weights of 1 beat maximum likelihood: `sqrt(m2) std(nu) /
+    |mean(nu)|`."""
 
 
 def estimate_lateral(flow: ArrayLike, *, noise_std: float | None = None, weights: Literal["shrunk", "ml", "ones"] = "shrunk") -> LateralEstimate:
-    """The direction of a translation along the image plane (`u_z = 0`) of a camera that does not turn, from flow at N points, wherever they are.
+    """The direction of a translation along the image plane (`u_z = 0`) of a camera that does not turn, from
+    flow at N points, wherever they are.
 
-    Source: section 5 of T. Endoh, T. Toriu, N. Tagawa, "The Maximum Likelihood Estimator is Not 'Optimal' on 3-D Motion Estimation from Noisy Optical Flow". The variances are of first order: they hold while they are small beside 1 rad^2.
+    Source: section 5 of T. Endoh, T. Toriu, N. Tagawa, "The Maximum Likelihood Estimator is Not 'Optimal' on
+    3-D Motion Estimation from Noisy Optical Flow". The variances are of first order: they hold while they are
+    small beside 1 rad^2.
 
     Parameters
     ----------
@@ -69,7 +78,9 @@ def estimate_lateral(flow: ArrayLike, *, noise_std: float | None = None, weights
     noise_std : float, units of flow
         Standard deviation of each component. None: estimated from the flow across the direction.
     weights : "shrunk", "ml" or "ones"
-        "ml": each point's own depth, maximum likelihood (28), the principal axis of `sum f f^t`. "ones": the same for all (30), `atan2(sum f_y, sum f_x)`, better in large noise. "shrunk": depths drawn to their mean by what noise leaves of their scatter, never worse than either.
+        "ml": each point's own depth, maximum likelihood (28), the principal axis of `sum f f^t`. "ones": the
+        same for all (30), `atan2(sum f_y, sum f_x)`, better in large noise. "shrunk": depths drawn to their
+        mean by what noise leaves of their scatter, never worse than either.
 
     Raises
     ------
@@ -86,7 +97,8 @@ def estimate_lateral(flow: ArrayLike, *, noise_std: float | None = None, weights
 
 
 def lateral_bound(inv_depth: ArrayLike, *, noise_std: float) -> LateralBound:
-    """What any estimator, and each of those of `estimate_lateral`, makes of points with these true inverse depths: variances in rad^2, for the design of an experiment.
+    """What any estimator, and each of those of `estimate_lateral`, makes of points with these true inverse
+    depths: variances in rad^2, for the design of an experiment.
 
     Parameters
     ----------

@@ -24,7 +24,9 @@ def predict_flow(
 ) -> Array:
     """Flow of points under a motion: (N, 2), px/frame with K, else per frame; on the sphere (N, 3).
 
-    Instantaneous flow (1) where the points are, or (`whole_frame`) the exact displacement of points of the first view to the second as the motion is steady over the frame, `X_2 = exp([w]x) X_1 + V(w) u`: what a result of `estimate_motion` with placement "midpoint" says that the flow was.
+    Instantaneous flow (1) where the points are, or (`whole_frame`) the exact displacement of points of the
+    first view to the second as the motion is steady over the frame, `X_2 = exp([w]x) X_1 + V(w) u`: what a
+    result of `estimate_motion` with placement "midpoint" says that the flow was.
 
     Parameters
     ----------
@@ -50,6 +52,7 @@ def predict_flow(
 
 
 def essential_matrix(result: MotionEstimate | MotionSolution) -> Array:
-    """The essential matrix `[t]x Rot` (3, 3), no unit, of the two views: `eta_2 @ E @ eta_1 = 0`, with `Rot = exp([w]x)` and `t = V(w) u`, as the motion is steady over the frame."""
+    """The essential matrix `[t]x Rot` (3, 3), no unit, of the two views: `eta_2 @ E @ eta_1 = 0`, with `Rot =
+    exp([w]x)` and `t = V(w) u`, as the motion is steady over the frame."""
     kind("result", result, MotionEstimate, MotionSolution)
     return _motion3d_essential(result.translation, result.rotation)

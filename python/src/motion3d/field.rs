@@ -10,7 +10,7 @@ use crate::options::{self, Integer, Region};
 use crate::{arrays, field::FlowField, field::Store, field::each};
 use jacoflow::error::Error;
 use jacoflow::motion3d::{
-    CommonEffect, FieldOptions, RotationPrior, UncertainMotion, contact_map, estimate_field_motion, field_points,
+    FieldOptions, RotationPrior, SystematicEffect, UncertainMotion, contact_map, estimate_field_motion, field_points,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -24,11 +24,11 @@ pub fn motion3d_field_points<'py>(
     py: Python<'py>,
     field: &FlowField,
     spacing: Option<f64>,
-    most: Option<usize>,
+    max_points: Option<usize>,
     region: Option<Region>,
 ) -> Outcome<(Array<'py>, Array<'py>, Array<'py>, [f64; 5])> {
     single(field)?;
-    let chosen = FieldOptions { spacing, most, region: options::region(region)?, ..FieldOptions::default() };
+    let chosen = FieldOptions { spacing, max_points, region: options::region(region)?, ..FieldOptions::default() };
     let found = each!(field.store(), packed => {
         let field = field.core(packed, 0);
         interruptible(py, || field_points(&field, &chosen))
@@ -42,8 +42,8 @@ pub fn motion3d_field_points<'py>(
             found.spacing,
             found.points_per_independent_sample,
             found.correlation_length,
-            found.common.scale,
-            found.common.offset,
+            found.systematic_errors.scale,
+            found.systematic_errors.offset,
         ],
     ))
 }
@@ -65,9 +65,9 @@ impl FieldLayout<'_> {
     /// As the core takes it.
     fn core(&self) -> Outcome<FieldOptions> {
         let region = options::region(self.region)?;
-        let most = self.max_points.map(|most| options::count("max_points", most)).transpose()?;
+        let max_points = self.max_points.map(|limit| options::count("max_points", limit)).transpose()?;
         let patches = self.patches.map(|side| options::count("patches", side)).transpose()?;
-        Ok(FieldOptions { spacing: self.spacing, region, excluded: None, most, patches })
+        Ok(FieldOptions { spacing: self.spacing, region, excluded: None, max_points, patches })
     }
 
     /// The scene's rotation as what is known of the object's, if a scene is given.
@@ -138,9 +138,15 @@ impl PyUncertainMotion<'_> {
     /// As the core takes it.
     fn core(&self) -> Outcome<UncertainMotion> {
         let (tangent, covariance) = spread(&self.tangent, &self.covariance)?;
-        let displaced = fixed("common_errors.displacements", &self.displacements)?;
-        let common = CommonEffect { scale: self.scale, displaced, motion: fixed("common_errors.motion", &self.moves)? };
-        Ok(UncertainMotion { motion: motion(&self.translation, &self.rotation)?, tangent, covariance, common })
+        let displaced = fixed("systematic_errors.displacements", &self.displacements)?;
+        let systematic_errors =
+            SystematicEffect { scale: self.scale, displaced, motion: fixed("systematic_errors.motion", &self.moves)? };
+        Ok(UncertainMotion {
+            motion: motion(&self.translation, &self.rotation)?,
+            tangent,
+            covariance,
+            systematic_errors,
+        })
     }
 }
 

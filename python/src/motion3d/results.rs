@@ -2,7 +2,7 @@
 
 use crate::arrays;
 use crate::errors::Outcome;
-use jacoflow::motion3d::{CommonEffect, Motion, MotionBound, MotionEstimate};
+use jacoflow::motion3d::{Motion, MotionBound, MotionEstimate, SystematicEffect};
 use pyo3::prelude::*;
 
 type Array<'py> = Bound<'py, PyAny>;
@@ -45,16 +45,16 @@ impl<'py> PyMotion<'py> {
 
 /// What errors do that all flow has in common.
 #[derive(IntoPyObject)]
-struct PyCommon<'py> {
+struct PySystematicEffect<'py> {
     scale: f64,
     displacements: Array<'py>,
     motion: Array<'py>,
 }
 
-impl<'py> PyCommon<'py> {
-    fn new(py: Python<'py>, common: &CommonEffect) -> Outcome<Self> {
-        let (displacements, motion) = (matrix(py, &common.displaced)?, matrix(py, &common.motion)?);
-        Ok(Self { scale: common.scale, displacements, motion })
+impl<'py> PySystematicEffect<'py> {
+    fn new(py: Python<'py>, effect: &SystematicEffect) -> Outcome<Self> {
+        let (displacements, motion) = (matrix(py, &effect.displaced)?, matrix(py, &effect.motion)?);
+        Ok(Self { scale: effect.scale, displacements, motion })
     }
 }
 
@@ -68,7 +68,7 @@ pub struct PyEstimate<'py> {
     fell_back: bool,
     covariance: Array<'py>,
     tangent: Array<'py>,
-    common_errors: PyCommon<'py>,
+    systematic_errors: PySystematicEffect<'py>,
     crlb: Array<'py>,
     direction_std: f64,
     rotation_std: Array<'py>,
@@ -105,7 +105,7 @@ impl<'py> PyEstimate<'py> {
             fell_back: found.fell_back,
             covariance: matrix(py, &found.covariance)?,
             tangent: matrix(py, &found.tangent)?,
-            common_errors: PyCommon::new(py, &found.common)?,
+            systematic_errors: PySystematicEffect::new(py, &found.systematic_errors)?,
             crlb: matrix(py, &found.bound)?,
             direction_std: found.direction_std,
             rotation_std: vector(py, found.rotation_std)?,

@@ -6,7 +6,7 @@ use crate::motion3d::model::input::{Placement, check_field, measurement};
 use crate::motion3d::model::measurement::Measurement;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Row;
-use crate::motion3d::model::result::{CommonEffect, UncertainMotion};
+use crate::motion3d::model::result::{SystematicEffect, UncertainMotion};
 use crate::motion3d::model::rows::{Matrix5, MidpointDepth};
 use crate::motion3d::model::whitening::plane_row;
 use crate::parallel::{self, Threads};
@@ -22,7 +22,7 @@ pub(crate) struct Rates {
     tangent: Matrix2x3<f64>,
     /// Without what errors add that all flow has in common, where that is known.
     covariance: Matrix5,
-    common: CommonEffect,
+    systematic_errors: SystematicEffect,
 }
 
 /// Slopes of a rate along the axes of `u` and along `w` (5), and by the point's own flow on the plane at
@@ -32,9 +32,9 @@ pub(crate) type Slopes = SVector<f64, 7>;
 impl Rates {
     /// Without a covariance, standard deviations are NaN.
     pub fn new(of: &UncertainMotion) -> Self {
-        let covariance = Matrix5::from_fn(|i, j| of.covariance[i][j]) - of.common.added();
+        let covariance = Matrix5::from_fn(|i, j| of.covariance[i][j]) - of.systematic_errors.added();
         let tangent = Matrix2x3::from_fn(|i, j| of.tangent[i][j]);
-        Self { motion: of.motion, tangent, covariance, common: of.common }
+        Self { motion: of.motion, tangent, covariance, systematic_errors: of.systematic_errors }
     }
 
     /// Slopes of `nu u_z` with this surface; of the flow alone at the epipole, where a depth is its
@@ -53,7 +53,7 @@ impl Rates {
     /// is one of the rate, a displacement moves the motion and each point's depth together.
     pub fn variance(&self, rate: f64, slopes: &Slopes) -> f64 {
         let (motion, flow) = (slopes.fixed_rows::<5>(0).into_owned(), slopes.fixed_rows::<2>(5).transpose());
-        motion.dot(&(self.covariance * motion)) + self.common.variance(rate, &motion, &flow)
+        motion.dot(&(self.covariance * motion)) + self.systematic_errors.variance(rate, &motion, &flow)
     }
 
     /// `-1 / (nu u_z)` and its standard deviation, frames, by first order from the variance of `nu` and from
@@ -156,7 +156,7 @@ mod tests {
             motion: scene.motion,
             tangent: crate::motion3d::model::rows::nested(&tangent),
             covariance: [[f64::NAN; 5]; 5],
-            common: CommonEffect::default(),
+            systematic_errors: SystematicEffect::default(),
         };
         let rates = Rates::new(&known);
         let row = observations.row(3);

@@ -191,7 +191,7 @@ impl Neighbourhood {
             (rows * self.all[k].row.transpose(), rows * near[k].transpose(), correlations)
         };
         let count = self.all.len() as f64;
-        // Of many points every so manieth stands for its neighbours.
+        // Of many points a regular subset stands for its neighbours.
         let step = self.all.len().div_ceil(FEWER).max(1);
         let chosen: Vec<usize> = (step / 2..self.all.len()).step_by(step).collect();
         let each = count / chosen.len().max(1) as f64;

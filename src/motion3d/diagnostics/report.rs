@@ -35,7 +35,7 @@ pub(crate) fn report(
     out.alternatives.clone_from(&solution.alternatives);
     out.efficient = solution.smooth.is_some();
     out.fell_back = solution.fell_back;
-    out.common = solution.common;
+    out.systematic_errors = solution.systematic_errors;
     let (rates, seen, u_z) = (Rates::new(&out.uncertain()), depths(all, motion), motion.u().z);
     let half_way = all.turn.map_or_else(MidpointDepth::default, |turn| turn.half_way(&motion.u()));
     let mut place = vec![None; flow.len()];

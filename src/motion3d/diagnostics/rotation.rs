@@ -10,7 +10,7 @@ use crate::motion3d::kernels::{add_to_rotation, equations};
 use crate::motion3d::model::measurement::Measurement;
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::{KnownRotation, Observations, ROUNDING};
-use crate::motion3d::model::options::CommonErrors;
+use crate::motion3d::model::options::SystematicErrors;
 use crate::motion3d::model::result::Alternative;
 use crate::motion3d::model::rows::{Derotation, Matrix5, Vector5};
 use crate::motion3d::model::whitening::Whitening;
@@ -61,7 +61,7 @@ impl RotationOnly {
     pub fn systematic_error<const N: usize, const L: usize>(
         &self,
         all: impl Iterator<Item = Measurement<N, L>>,
-        errors: &CommonErrors,
+        errors: &SystematicErrors,
         unit: &Matrix2<f64>,
     ) -> Matrix3<f64> {
         let response = all.map(|one| one.response(None, &SVector::zeros())).sum();

@@ -6,8 +6,8 @@ use crate::motion3d::kernels::{Weighted, depths, equations, information};
 use crate::motion3d::model::input::{Flow, to_plane};
 use crate::motion3d::model::motion::Motion;
 use crate::motion3d::model::observations::Observations;
-use crate::motion3d::model::options::{CommonErrors, MotionOptions};
-use crate::motion3d::model::result::{Alternative, CommonEffect, Status};
+use crate::motion3d::model::options::{MotionOptions, SystematicErrors};
+use crate::motion3d::model::result::{Alternative, Status, SystematicEffect};
 use crate::motion3d::model::rows::Matrix5;
 use crate::motion3d::robust::{Consensus, weighted_by_posterior};
 use crate::motion3d::solver::covariance::{PluginCovariances, inverse};
@@ -23,7 +23,7 @@ pub(crate) struct Solution {
     /// `None` where nothing is known.
     pub covariance: Option<Matrix5>,
     /// What is in it of errors that all flow has in common.
-    pub common: CommonEffect,
+    pub systematic_errors: SystematicEffect,
     /// Maximum likelihood.
     pub minimum: Minimum,
     /// Its covariance; `None` where the depths are mostly noise, so that nothing is known of it.
@@ -55,7 +55,7 @@ impl Solution {
             motion: minimum.motion,
             tangent: minimum.tangent,
             covariance: plugged.as_ref().map(|plugged| plugged.likelihood),
-            common: CommonEffect::default(),
+            systematic_errors: SystematicEffect::default(),
             minimum,
             plugged,
             described: true,
@@ -95,15 +95,15 @@ impl Solution {
         let at = Weighted { motion: &self.motion, tangent: &self.tangent, nu: &nu };
         let errors = options.systematic_errors();
         let squares = information(inliers, &at, 0.0);
-        let effect = match inverse(&squares).filter(|_| errors != CommonErrors::default()) {
+        let effect = match inverse(&squares).filter(|_| errors != SystematicErrors::default()) {
             Some(inverse) => errors.on((&inverse, &response(inliers, &at)), &at.motion.w(), &to_plane(flow.camera())),
-            None => CommonEffect::default(),
+            None => SystematicEffect::default(),
         };
         let own = match options.correlation() {
             Some(length) => correlated_covariance(&independent, inliers, &at, flow, length),
             None => Some(independent),
         };
-        (self.common, self.covariance) = (effect, own);
+        (self.systematic_errors, self.covariance) = (effect, own);
         let (Some(own), common) = (own, effect.added()) else { return };
         let mut covariance = own * wider + common;
         if let Some(known) = &inliers.prior {

@@ -10,7 +10,7 @@ pub use patches::{FieldPatches, field_patches};
 use super::estimate::estimate_motion;
 use super::model::input::{Flow, Noise, check_field, measurement, refuse_if};
 use super::model::observations::SAMPLE;
-use super::model::options::{CommonErrors, MotionOptions};
+use super::model::options::{MotionOptions, SystematicErrors};
 use super::model::result::MotionEstimate;
 use super::patches::estimate_patch_motion;
 use super::solver::refine::MANY;
@@ -42,10 +42,10 @@ pub struct FieldOptions {
     pub region: Option<Rect>,
     /// Only points outside of this rectangle of pixels.
     pub excluded: Option<Rect>,
-    /// Most points, of the region if there is one; the grid is made coarser to keep to it. Default: no limit.
-    pub most: Option<usize>,
+    /// Maximum number of points, of the region if there is one: above it the grid is coarser. Default: no limit.
+    pub max_points: Option<usize>,
     /// Side of square windows, px, each of which becomes one patch with six numbers; not with `spacing` and
-    /// `most`. Default: points.
+    /// `max_points`. Default: points.
     pub patches: Option<usize>,
 }
 
@@ -60,14 +60,14 @@ pub struct FieldPoints {
     /// Its covariances, 4 values a point, px^2; of points closer than independent ones times what they share,
     /// `4 pi l^2 / spacing^2`.
     pub covariances: Vec<f64>,
-    /// How many points share one error: what the covariances are multiplied with. For
+    /// Number of given points per statistically independent one, the factor in the covariances. For
     /// [`MotionOptions::points_per_independent_sample`](crate::motion3d::MotionOptions).
     pub points_per_independent_sample: f64,
     /// How far errors of neighbours go together, px: the field's own. For
     /// [`MotionOptions::correlation_length`](crate::motion3d::MotionOptions).
     pub correlation_length: f64,
     /// What the flow of the whole field may have in common, estimated from its covariances.
-    pub common: CommonErrors,
+    pub systematic_errors: SystematicErrors,
     /// The spacing that came out of the options, px.
     pub spacing: f64,
 }
@@ -86,7 +86,7 @@ pub struct FieldMotion {
 /// The rigid motion of the scene in a flow field, from the field's own covariances.
 ///
 /// Options that are `None` take the field's: number of points per independent one, correlation length,
-/// standard deviations of common errors.
+/// standard deviations of systematic errors.
 ///
 /// # Errors
 /// As [`field_points`], [`field_patches`] and the estimates from them.
@@ -97,15 +97,18 @@ pub fn estimate_field_motion<T: Real>(
     options: &MotionOptions,
 ) -> Result<FieldMotion> {
     if let Some(size) = chosen.patches {
-        for (name, is_given) in [("spacing", chosen.spacing.is_some()), ("max_points", chosen.most.is_some())] {
+        for (name, is_given) in [("spacing", chosen.spacing.is_some()), ("max_points", chosen.max_points.is_some())] {
             refuse_if(is_given, name, "its default with patches", "another value")?;
         }
         let patches = field_patches(field, size, chosen.region)?;
-        let estimate = estimate_patch_motion(&patches.seen_by(camera), &options.with_common(patches.common))?;
+        let estimate = estimate_patch_motion(
+            &patches.seen_by(camera),
+            &options.with_systematic_errors(patches.systematic_errors),
+        )?;
         return Ok(FieldMotion { estimate, points: patches.points, spacing: size as f64 });
     }
     let found = field_points(field, chosen)?;
-    let mut options = options.with_common(found.common);
+    let mut options = options.with_systematic_errors(found.systematic_errors);
     options.points_per_independent_sample.get_or_insert(found.points_per_independent_sample);
     options.correlation_length.get_or_insert(found.correlation_length);
     let flow = Flow::Plane { points: &found.points, flow: &found.flow, camera: Some(camera) };
@@ -113,7 +116,7 @@ pub fn estimate_field_motion<T: Real>(
     Ok(FieldMotion { estimate, points: found.points, spacing: found.spacing })
 }
 
-/// Takes every so manieth valid estimate of a field.
+/// Takes valid estimates of a field at a spacing.
 ///
 /// Errors of windowed estimates correlate over the length `l`, as `exp(-d^2 / (4 l^2))`. Points of a grid get
 /// their covariance times `4 pi l^2 / spacing^2`, the number of points on the area over which errors are one,
@@ -139,16 +142,21 @@ pub fn field_points<T: Real>(field: &FlowField<T>, options: &FieldOptions) -> Re
         if options.spacing.is_none() && options.region.is_some() {
             step = (finest..=step).rev().find(|&step| count(step) >= SAMPLE).unwrap_or(finest);
         }
-        while options.most.is_some_and(|most| count(step) > most.max(1)) {
+        while options.max_points.is_some_and(|limit| count(step) > limit.max(1)) {
             step += 1;
         }
         spacing = (step * stride) as f64;
         let shared = 4.0 * std::f64::consts::PI * (correlation_length / spacing).powi(2);
         points_per_independent_sample = shared.max(1.0);
     }
-    let common = common_errors(field);
-    let mut out =
-        FieldPoints { points_per_independent_sample, correlation_length, common, spacing, ..FieldPoints::default() };
+    let systematic_errors = systematic_errors(field);
+    let mut out = FieldPoints {
+        points_per_independent_sample,
+        correlation_length,
+        systematic_errors,
+        spacing,
+        ..FieldPoints::default()
+    };
     for (site, at) in site_pixels(field, step) {
         let excluded = options.excluded.is_some() && is_within(options.excluded, at);
         if excluded || !is_within(options.region, at) {
@@ -182,14 +190,14 @@ fn is_within(region: Option<Rect>, (x, y): (usize, usize)) -> bool {
 
 /// Common errors of a whole field: an object that moves little in the picture does not determine the scale
 /// error of flow.
-fn common_errors<T: Real>(field: &FlowField<T>) -> CommonErrors {
+fn systematic_errors<T: Real>(field: &FlowField<T>) -> SystematicErrors {
     let step = (field.len() / MANY).isqrt().max(1);
-    common_errors_of(site_pixels(field, step).filter_map(|(site, _)| measurement(field, site)))
+    systematic_errors_of(site_pixels(field, step).filter_map(|(site, _)| measurement(field, site)))
 }
 
-/// Common errors of points with flow and covariance: the scale is off by what would be the whole error of the
+/// Systematic errors of points with flow and covariance: the scale is off by what would be the whole error of the
 /// points that determine it best.
-fn common_errors_of(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> CommonErrors {
+fn systematic_errors_of(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> SystematicErrors {
     let (mut squares, mut variances) = (Vec::new(), Vec::new());
     for (flow, covariance) in points {
         let square = covariance.cholesky().map(|factor| flow.dot(&factor.solve(&flow)));
@@ -201,7 +209,7 @@ fn common_errors_of(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) 
     let square = quantile(&mut squares, 1.0 - SHARPEST_SHARE).unwrap_or(0.0);
     // An error has two components. Flow that may be twice as long or none has no scale.
     let scale = if square > 0.0 { (2.0 / square).sqrt().min(1.0) } else { 1.0 };
-    CommonErrors { scale, offset: BIAS_PER_NOISE * median(&mut variances).unwrap_or(0.0).sqrt() }
+    SystematicErrors { scale, offset: BIAS_PER_NOISE * median(&mut variances).unwrap_or(0.0).sqrt() }
 }
 
 #[cfg(test)]
@@ -211,10 +219,10 @@ mod tests {
     #[test]
     fn common_errors_are_estimated_from_the_sharpest_points() {
         let point = |length: f64| (Vector2::new(length, 0.0), Matrix2::identity() * 0.04);
-        let common = common_errors_of([1.0, 4.0, 9.0].into_iter().map(point));
+        let common = systematic_errors_of([1.0, 4.0, 9.0].into_iter().map(point));
         // A flow of 45 standard deviations, and one point's of 0.2.
         assert!((common.scale - (2.0f64 / 2025.0).sqrt()).abs() < 1e-12, "{common:?}");
         assert!((common.offset - BIAS_PER_NOISE * 0.2).abs() < 1e-12, "{common:?}");
-        assert_eq!(common_errors_of(std::iter::empty()).scale, 1.0);
+        assert_eq!(systematic_errors_of(std::iter::empty()).scale, 1.0);
     }
 }

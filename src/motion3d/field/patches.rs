@@ -1,10 +1,10 @@
 //! A flow field cut into windows, each of them one patch with six numbers.
 
-use super::{MIN_SPACING, common_errors, is_within, site_pixels};
+use super::{MIN_SPACING, is_within, site_pixels, systematic_errors};
 use crate::error::Result;
 use crate::math::Real;
 use crate::motion3d::diagnostics::correlated_noise::area;
-use crate::motion3d::model::{input::check_field, input::refuse_if, options::CommonErrors};
+use crate::motion3d::model::{input::check_field, input::refuse_if, options::SystematicErrors};
 use crate::motion3d::patches::AffinePatches;
 use crate::parallel::{self, Threads};
 use crate::types::{FieldLayout, FlowField, Intrinsics, MOTION_NAMES, Rect, SamplingGrid};
@@ -20,7 +20,7 @@ pub struct FieldPatches {
     /// Covariances of the six numbers, 36 values a patch, row by row.
     pub covariances: Vec<f64>,
     /// What the flow of the whole field may have in common, estimated from its covariances.
-    pub common: CommonErrors,
+    pub systematic_errors: SystematicErrors,
 }
 
 impl FieldPatches {
@@ -60,7 +60,7 @@ pub fn field_patches<T: Real>(field: &FlowField<T>, size: usize, region: Option<
     let sites = windows.pixels_of_windows(field, region);
     let fitted = Threads::default()
         .install(|| parallel::map(sites.iter().enumerate(), |(k, sites)| windows.fit(field, k, sites)));
-    let mut out = FieldPatches { common: common_errors(field), ..FieldPatches::default() };
+    let mut out = FieldPatches { systematic_errors: systematic_errors(field), ..FieldPatches::default() };
     for (k, (motion, covariance)) in fitted.into_iter().enumerate().filter_map(|(k, fit)| Some((k, fit?))) {
         out.points.push(windows.middle(k));
         out.motion.push(motion.into());

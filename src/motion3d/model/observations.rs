@@ -64,7 +64,7 @@ pub(crate) struct Observations {
     pub level: Level,
     /// What is known of the rotation beforehand.
     pub prior: Option<KnownRotation>,
-    /// How many points share one error: their own has a variance of one over that.
+    /// Number of given points per statistically independent one: their own variance is one over it.
     pub points_per_independent_sample: f64,
     /// Whether errors of neighbours are independent.
     pub independent: bool,

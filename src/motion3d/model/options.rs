@@ -3,7 +3,7 @@
 use super::input::{Flow, Noise, Placement, refuse_if};
 use super::motion::Motion;
 use super::observations::KnownRotation;
-use super::result::CommonEffect;
+use super::result::SystematicEffect;
 use super::rows::Matrix5;
 use crate::error::{Result, numbers};
 use crate::parallel::Threads;
@@ -74,9 +74,8 @@ pub struct MotionOptions {
     pub initial: Option<Motion>,
     /// What is known of the rotation beforehand; default: nothing.
     pub rotation_prior: Option<RotationPrior>,
-    /// How many points share one error, at least 1: the noise given is so many times their own in variance,
-    /// so that together they count once. What is an outlier, and what chance explains, is judged by their
-    /// own. Default: 1.
+    /// Number of given points per statistically independent one, at least 1: the given variances are the
+    /// points' own times this number. Outliers and chance are judged by the points' own. Default: 1.
     pub points_per_independent_sample: Option<f64>,
     /// Correlation length of the errors of neighbours, in the unit of the points (px with a camera, rad on
     /// the sphere), as windowed flow has: the covariance is in no direction smaller than that of independent
@@ -96,8 +95,8 @@ pub struct MotionOptions {
 
 impl MotionOptions {
     /// Errors that all flow has in common.
-    pub(crate) fn systematic_errors(&self) -> CommonErrors {
-        CommonErrors { scale: self.flow_scale_std.unwrap_or(0.0), offset: self.flow_bias_std.unwrap_or(0.0) }
+    pub(crate) fn systematic_errors(&self) -> SystematicErrors {
+        SystematicErrors { scale: self.flow_scale_std.unwrap_or(0.0), offset: self.flow_bias_std.unwrap_or(0.0) }
     }
 
     /// How far errors correlate, where they do.
@@ -105,10 +104,10 @@ impl MotionOptions {
         self.correlation_length.filter(|length| *length > 0.0)
     }
 
-    /// The same options with these common errors where none are given.
-    pub(crate) fn with_common(&self, common: CommonErrors) -> Self {
-        let (flow_scale_std, flow_bias_std) = (self.flow_scale_std.or(Some(common.scale)), self.flow_bias_std);
-        Self { flow_scale_std, flow_bias_std: flow_bias_std.or(Some(common.offset)), ..self.clone() }
+    /// The same options with these systematic errors where none are given.
+    pub(crate) fn with_systematic_errors(&self, errors: SystematicErrors) -> Self {
+        let (flow_scale_std, flow_bias_std) = (self.flow_scale_std.or(Some(errors.scale)), self.flow_bias_std);
+        Self { flow_scale_std, flow_bias_std: flow_bias_std.or(Some(errors.offset)), ..self.clone() }
     }
 
     pub(crate) fn check(&self, flow: &Flow<'_>, noise: &Noise<'_>) -> Result<()> {
@@ -118,8 +117,7 @@ impl MotionOptions {
             // Depths have any unit, but no sign that could be turned: what is behind the camera is not seen.
             let finite: Vec<f64> = depths.iter().copied().filter(|nu| nu.is_finite()).collect();
             let is_behind = !finite.is_empty() && finite.iter().all(|&nu| nu <= 0.0);
-            let expected = "inverse depths of points before the camera, which are positive";
-            refuse_if(is_behind, name, expected, "none above 0")?;
+            refuse_if(is_behind, name, "at least one positive value", "none")?;
         }
         if let Some(RotationPrior { rotation, covariance }) = &self.rotation_prior {
             let got = format!("{} with {}", numbers(rotation), numbers(covariance.as_flattened()));
@@ -149,7 +147,7 @@ impl MotionOptions {
 
     /// On the plane or the sphere.
     pub(crate) fn check_common(&self, is_spherical: bool) -> Result<()> {
-        let CommonErrors { scale, offset } = self.systematic_errors();
+        let SystematicErrors { scale, offset } = self.systematic_errors();
         refuse_if(!(0.0..=1.0).contains(&scale), "flow_scale_std", "a number from 0 to 1", scale)?;
         // Squares of larger ones are not finite.
         refuse_if(!(0.0..=1e100).contains(&offset), "flow_bias_std", "a number from 0 to 1e100", offset)?;
@@ -160,14 +158,14 @@ impl MotionOptions {
 
 /// Standard deviations of errors that all flow of a picture has in common. Default: 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct CommonErrors {
+pub struct SystematicErrors {
     /// Of the factor, see [`MotionOptions::flow_scale_std`].
     pub scale: f64,
     /// Of the displacement, see [`MotionOptions::flow_bias_std`].
     pub offset: f64,
 }
 
-impl CommonErrors {
+impl SystematicErrors {
     /// What both do to a motion: `inverse` of the equations' information, which holds what is known
     /// beforehand of the rotation, and their `response` (see
     /// [`Measurement::response`](super::measurement::Measurement::response)). `unit` maps flow to the plane
@@ -177,11 +175,11 @@ impl CommonErrors {
         (inverse, response): (&Matrix5, &Matrix5),
         w: &Vector3<f64>,
         unit: &Matrix2<f64>,
-    ) -> CommonEffect {
+    ) -> SystematicEffect {
         let mut changes = SMatrix::<f64, 5, 3>::zeros();
         changes.fixed_view_mut::<3, 1>(0, 0).copy_from(&(w * self.scale));
         changes.fixed_view_mut::<2, 2>(3, 1).copy_from(&(unit * self.offset));
         let motion = inverse * response * changes;
-        CommonEffect { scale: self.scale, displaced: (unit * self.offset).into(), motion: motion.into() }
+        SystematicEffect { scale: self.scale, displaced: (unit * self.offset).into(), motion: motion.into() }
     }
 }

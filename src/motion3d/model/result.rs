@@ -1,7 +1,7 @@
 //! The result of an estimate.
 
 use super::{motion::Motion, rows::Matrix5, rows::Vector5, rows::nested};
-use crate::types::Intrinsics;
+use crate::types::{Intrinsics, choices};
 use nalgebra::{Matrix2, Matrix2x3, Matrix3x2, RowVector2, SVector, Vector2};
 
 /// Whether an estimate is usable, or why not.
@@ -30,20 +30,15 @@ pub enum Status {
     LowSnr,
 }
 
-impl Status {
-    /// The word used in files and in Python.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::FewPoints => "few_points",
-            Self::TooFewPoints => "too_few_points",
-            Self::RotationOnly => "rotation_only",
-            Self::Ambiguous => "ambiguous",
-            Self::IllConditioned => "ill_conditioned",
-            Self::LowSnr => "low_snr",
-        }
-    }
-}
+choices!(Status:
+    Ok "ok",
+    FewPoints "few_points",
+    TooFewPoints "too_few_points",
+    RotationOnly "rotation_only",
+    Ambiguous "ambiguous",
+    IllConditioned "ill_conditioned",
+    LowSnr "low_snr",
+);
 
 /// The maximum-likelihood solution beside the one that is returned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,7 +79,7 @@ pub struct MotionEstimate {
     /// Axes of `psi`: two unit vectors perpendicular to `u`.
     pub tangent: [[f64; 3]; 2],
     /// What is in the covariance of errors that all flow has in common.
-    pub common: CommonEffect,
+    pub systematic_errors: SystematicEffect,
     /// The Cramér-Rao bound (8), with the information estimated; NaN where it is not known.
     pub bound: [[f64; 5]; 5],
     /// Standard deviation of the direction, `sqrt(tr psi)`, degrees; NaN where the covariance is not known,
@@ -124,8 +119,8 @@ pub struct MotionEstimate {
 impl MotionEstimate {
     /// The motion as [`contact_map`](crate::motion3d::contact_map) takes it.
     pub fn uncertain(&self) -> UncertainMotion {
-        let Self { motion, tangent, covariance, common, .. } = *self;
-        UncertainMotion { motion, tangent, covariance, common }
+        let Self { motion, tangent, covariance, systematic_errors, .. } = *self;
+        UncertainMotion { motion, tangent, covariance, systematic_errors }
     }
 
     /// No motion, for N points.
@@ -139,7 +134,7 @@ impl MotionEstimate {
             fell_back: false,
             covariance: unknown,
             tangent: nowhere,
-            common: CommonEffect::default(),
+            systematic_errors: SystematicEffect::default(),
             bound: unknown,
             direction_std: f64::NAN,
             rotation_std: [f64::NAN; 3],
@@ -186,7 +181,7 @@ pub fn focus_of_expansion(
 ///
 /// What is computed from the same flow and the motion, as depths are, errs with both.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct CommonEffect {
+pub struct SystematicEffect {
     /// Standard deviation of the factor.
     pub scale: f64,
     /// Displacements of one standard deviation along both axes of the picture, on the plane at distance 1.
@@ -196,7 +191,7 @@ pub struct CommonEffect {
     pub motion: [[f64; 5]; 3],
 }
 
-impl CommonEffect {
+impl SystematicEffect {
     /// What displacements of one standard deviation do to the motion.
     fn moves(&self) -> [Vector5; 3] {
         self.motion.map(SVector::from)
@@ -228,5 +223,5 @@ pub struct UncertainMotion {
     /// Covariance of `(psi, w)`, rad and rad/frame.
     pub covariance: [[f64; 5]; 5],
     /// What is in it of errors that all flow has in common, those of the points whose times are wanted too.
-    pub common: CommonEffect,
+    pub systematic_errors: SystematicEffect,
 }

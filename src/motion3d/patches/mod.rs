@@ -191,9 +191,9 @@ fn estimate(patches: &AffinePatches<'_>, options: &MotionOptions) -> MotionEstim
     let again = |_| covariance_factor(&system, &motion, &surfaces, out.efficient, rng.stream(2));
     let wider = plugged.as_ref().map_or(1.0, again);
     if let Some(inverse) = inverse_at(&surfaces).filter(|_| covariance.is_some()) {
-        out.common = errors.on((&inverse, &system.response(&motion, &surfaces)), &motion.w(), &unit);
+        out.systematic_errors = errors.on((&inverse, &system.response(&motion, &surfaces)), &motion.w(), &unit);
     }
-    let covariance = covariance.map(|covariance| covariance * wider + out.common.added());
+    let covariance = covariance.map(|covariance| covariance * wider + out.systematic_errors.added());
     set_motion(&mut out, &motion, &tangent, covariance.as_ref(), &system.equations(&motion, &tangent, None));
     out.likelihood = likelihood(best, plugged.as_ref());
     report_surfaces(&mut out, &system, &surfaces);

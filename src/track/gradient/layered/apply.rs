@@ -138,7 +138,7 @@ pub(super) fn coast(state: &mut State) {
     state.motion.pose = state.placed(state.motion.pose, state.motion.filter.position());
 }
 
-/// The middle of the support was at a place before it was learnt.
+/// The middle of the support was at a place before it was learned.
 pub(super) fn settle_outline(state: &mut State, before: [f64; 2]) {
     let after = state.position(&state.motion.pose);
     for (k, unsettled) in state.uncertainty.outline.iter_mut().enumerate() {

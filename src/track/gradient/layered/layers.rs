@@ -82,7 +82,7 @@ impl Target {
         [(self.a.width() / 2) as f64, (self.a.height() / 2) as f64]
     }
 
-    /// Centroid of the support as learnt so far, target coordinates.
+    /// Centroid of the support as learned so far, target coordinates.
     pub fn centroid(&self) -> [f64; 2] {
         self.centroid_of(|at| self.a.data()[at])
     }

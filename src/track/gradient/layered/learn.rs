@@ -1,4 +1,4 @@
-//! What is learnt from a frame in which the target was seen well.
+//! What is learned from a frame in which the target was seen well.
 
 use super::layers::{Background, PRIOR, Target};
 use super::oriented_box::OrientedBox;
@@ -17,7 +17,7 @@ const TEMPLATE_RATE: f64 = 0.08;
 const BACKGROUND_RATE: f64 = 0.3;
 /// Longest step of the background where it changes suddenly, grey levels.
 const SUDDEN_STEP: f64 = 1.5;
-/// Support from which on the template is learnt; outside it goes on as it is there.
+/// Support from which on the template is learned; outside it goes on as it is there.
 pub(super) const SOLID: f64 = 0.9;
 /// Width of that continuation, px of the target.
 pub(super) const CONTINUED: f64 = 2.0;

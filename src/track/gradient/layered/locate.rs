@@ -25,7 +25,7 @@ const DISPLACEMENT_STD: f64 = 1.0;
 pub(super) const MIN_VISIBILITY_WITHOUT_SEARCH: f64 = 0.6;
 /// The same from which on, on one side, a look-alike touches.
 pub(super) const TOUCH: (f64, f64) = (0.08, 0.6);
-pub(super) const TOUCHED_BEFORE: &str = "something like the target touched it a moment ago";
+pub(super) const TOUCHED_BEFORE: &str = "a similar object was adjacent in a recent frame";
 /// Reach of the search, px: at first, and at most.
 pub(super) const REACH: (usize, usize) = (12, 36);
 

@@ -33,7 +33,7 @@ pub(super) fn report_motion(tracker: &State, state: &mut TrackState) {
     } else {
         ([0, 1].map(|k| speed[k] + motion[k]), speed)
     };
-    // The filter follows the support as learnt.
+    // The filter follows the support as learned.
     let undetermined = tracker.undetermined();
     state.position = sum(tracker.motion.filter.position(), undetermined);
     state.acceleration = tracker.motion.filter.acceleration();

@@ -11,12 +11,12 @@ use crate::track::gradient::options::{CameraMotion, GradientOptions, Shape};
 use crate::types::{Frame, TargetBox};
 
 /// Around the box, the scene may be hidden: share of its sides, and px. Limbs and what else is not in the
-/// support must not be learnt as background, for the target would look like that a moment later.
+/// support must not be learned as background, for the target would look like that a moment later.
 const HIDES: (f64, f64) = (0.1, 4.0);
-/// Deviation of the middle of the learnt support from that of the target, px: it stays from frame to frame,
+/// Deviation of the middle of the learned support from that of the target, px: it stays from frame to frame,
 /// and no filter takes it away.
 const OUTLINE: f64 = 0.07;
-/// What noise adds to the deviation of the middle, over noise by contrast, px: what is learnt of an edge from
+/// What noise adds to the deviation of the middle, over noise by contrast, px: what is learned of an edge from
 /// noisy frames stays wrong for as long as it is remembered.
 const OUTLINE_IN_NOISE: f64 = 1.4;
 /// Frames after which it is done with that, in any case.
@@ -221,14 +221,14 @@ impl State {
         self.history.age < self.history.adapts_until && crate::ablation::keeps("gradient.adapting")
     }
 
-    /// From the centroid of the support as learnt to that of the support that the target is expected to
+    /// From the centroid of the support as learned to that of the support that the target is expected to
     /// have, px.
     pub fn undetermined(&self) -> [f64; 2] {
         if !crate::ablation::keeps("gradient.opposite") {
             return [0.0; 2];
         }
-        let (learnt, expected) = (self.target.centroid(), self.target.expected_centroid());
-        self.motion.pose.turn([0, 1].map(|k| expected[k] - learnt[k]))
+        let (learned, expected) = (self.target.centroid(), self.target.expected_centroid());
+        self.motion.pose.turn([0, 1].map(|k| expected[k] - learned[k]))
     }
 
     /// Covariance of position, velocity and acceleration along x and y: the filter's, and how well the
