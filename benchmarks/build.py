@@ -55,7 +55,8 @@ def used() -> float:
 
 
 def compiled(name: str, scratch: Path) -> tuple[float, float]:
-    """CPU seconds of the compiler on library and binding, and MB; leaves the package in a folder of that name."""
+    """CPU seconds of the compiler on library and binding, and MB; leaves the package in a folder of that
+    name."""
     target, into, seconds = scratch / "target", scratch / name, scratch / "seconds"
     features = "--features=avx512" if name == "AVX-512" else "--no-default-features"
     settings = [part for setting in VARIANTS[name] for part in ("--config", f"profile.ci.{setting}")]

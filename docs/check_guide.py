@@ -1,4 +1,5 @@
-"""Follow CONTRIBUTING.md's "Add a motion model in one place" literally, in a scratch copy: no other file has to change.
+"""Follow CONTRIBUTING.md's "Add a motion model in one place" literally, in a scratch copy: no other file has
+to change.
 
 Usage: python docs/check_guide.py
 """

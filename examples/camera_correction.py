@@ -1,7 +1,9 @@
 """Camera-coordinate correction: pan, roll and zoom of a shaking camera read off the flow, and undone.
 
-A camera that pans, rolls and zooms sees the still world move by u = a + s (x - xc) - w (y - yc), v = b + w (x - xc) + s (y - yc). The four numbers come from a fit to
-the flow *and its Jacobian*, each weighted by its standard deviation; chained over the sequence they bring every frame back to the first one's coordinates.
+A camera that pans, rolls and zooms sees the still world move by u = a + s (x - xc) - w (y - yc), v = b + w (x
+- xc) + s (y - yc). The four numbers come from a fit to
+the flow *and its Jacobian*, each weighted by its standard deviation; chained over the sequence they bring
+every frame back to the first one's coordinates.
 """
 
 from __future__ import annotations

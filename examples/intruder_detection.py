@@ -1,7 +1,9 @@
-"""Intruder detection: something moves where nothing should, told from camera noise by the flow's own covariance.
+"""Intruder detection: something moves where nothing should, told from camera noise by the flow's own
+covariance.
 
-A fixed camera looks at a yard. From frame 6 on a person-sized patch walks through it. In every frame each pixel's speed is put in units of its standard
-deviation; an alarm needs a connected patch of many significant pixels. Light that changes over the whole picture does not matter: flow does not depend on intensity gain.
+A fixed camera looks at a yard. From frame 6 on a person-sized patch walks through it. In every frame each
+pixel's speed is put in units of its standard deviation; an alarm needs a connected patch of many significant
+pixels. Light that changes over the whole picture does not matter: flow does not depend on intensity gain.
 """
 
 from __future__ import annotations
@@ -53,7 +55,8 @@ def significance(field: jacoflow.FlowField) -> np.ndarray:
 
 
 def largest_patch(mask: np.ndarray) -> np.ndarray | None:
-    """The largest connected patch of a mask, as coordinates (N, 2) of (row, column); None for an empty mask."""
+    """The largest connected patch of a mask, as coordinates (N, 2) of (row, column); None for an empty
+    mask."""
     left = mask.copy()
     best: list[tuple[int, int]] = []
     while left.any():

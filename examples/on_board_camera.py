@@ -1,7 +1,8 @@
 """On-board camera: which of the things ahead come nearer, in how many seconds, and which draw away or cross.
 
-A camera drives towards a far background. Ahead of it are a car that it closes in on, a car that has overtaken and draws away, and one that crosses the road. Three frames
-are enough: a thing's divergence is 2 / (time to contact), whatever its own movement across the picture, and the point that stands still in the background is
+A camera drives towards a far background. Ahead of it are a car that it closes in on, a car that has overtaken
+and draws away, and one that crosses the road. Three frames are enough: a thing's divergence is 2 / (time to
+contact), whatever its own movement across the picture, and the point that stands still in the background is
 where the camera is heading.
 """
 
@@ -22,7 +23,8 @@ HEADING = (170.0, 80.0)
 
 @dataclass
 class Thing:
-    """Something in view: a box that moves by (u, v) px/frame and comes nearer with a time to contact in frames (negative: draws away, None: neither)."""
+    """Something in view: a box that moves by (u, v) px/frame and comes nearer with a time to contact in
+    frames (negative: draws away, None: neither)."""
 
     name: str
     centre: tuple[float, float]

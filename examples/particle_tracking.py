@@ -1,7 +1,7 @@
 """Two people who look alike cross before a hand-held camera: who is who afterwards?
 
-A particle filter follows each. Corners that move with a person, not with the background, distinguish them, which colour cannot. The map of what is not
-background comes from the corners alone, with a camera that moves.
+A particle filter follows each. Corners that move with a person, not with the background, distinguish them,
+which colour cannot. The map of what is not background comes from the corners alone, with a camera that moves.
 """
 
 from __future__ import annotations

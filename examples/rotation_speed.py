@@ -1,6 +1,7 @@
 """Rotation speed of a machine from a patch of its surface that does not contain the axis.
 
-The curl of a turning surface is twice its angular velocity at every point of it, so any patch will do; the axis itself, p - M^-1 (u, v), may lie outside the picture.
+The curl of a turning surface is twice its angular velocity at every point of it, so any patch will do; the
+axis itself, p - M^-1 (u, v), may lie outside the picture.
 """
 
 from __future__ import annotations

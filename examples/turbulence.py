@@ -1,7 +1,8 @@
 """Fluids: turbulence statistics from a tracer's pictures.
 
-A random solenoidal velocity field carries a dye. From three frames: fluctuating speed, enstrophy and strain (their means are equal in incompressible
-isotropic turbulence), the residual divergence as a check on the measurement, and the Taylor length, all without differencing a flow.
+A random solenoidal velocity field carries a dye. From three frames: fluctuating speed, enstrophy and strain
+(their means are equal in incompressible isotropic turbulence), the residual divergence as a check on the
+measurement, and the Taylor length, all without differencing a flow.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ def main() -> None:
     scene = scenes.Scene("turbulence", width=WIDTH, height=HEIGHT, random_state=14, speed=SPEED, longest=LONGEST)
     camera = scenes.Sensor(noise=1.0, rounding="nearest", saturate=True, random_state=1)
     frames = [camera.apply_u8(scene.frame(t), index=k) for k, t in enumerate((-1.0, 0.0, 1.0))]
-    # A narrow window for the short waves, and less smoothing than usual: smoothing takes away strain of a fine tracer.
+    # A narrow window for the short waves, and less smoothing than usual: smoothing takes away strain of a
+    # fine tracer.
     field = jacoflow.flow(*frames, method=jacoflow.Windowed(window_sigma=2.5), preprocess=jacoflow.Preprocess(smooth=1.0))
     truth = scene.truth(0.0)
     inside = np.zeros((HEIGHT, WIDTH), dtype=bool)

@@ -1,7 +1,8 @@
 """Fluids: centre, circulation and core of a vortex from particle images.
 
-Tracer particles swirl in a drifting Lamb-Oseen vortex. The vorticity v_x - u_y comes straight from the estimator, without differencing a flow: its peak is the
-centre's, its sum over a disc the circulation, its width the core's.
+Tracer particles swirl in a drifting Lamb-Oseen vortex. The vorticity v_x - u_y comes straight from the
+estimator, without differencing a flow: its peak is the centre's, its sum over a disc the circulation, its
+width the core's.
 """
 
 from __future__ import annotations

@@ -171,9 +171,36 @@ fn comments_are_free_of_idioms() {
     );
 }
 
+/// The lines of a Python file that are comments or in docstrings, with their numbers from 1.
+fn python_comment_lines(text: &str) -> Vec<(usize, &str)> {
+    // Whether a text over several lines is a docstring, while there is one.
+    let mut open = None;
+    let mut found = Vec::new();
+    for (row, line) in text.lines().enumerate() {
+        let start = line.trim_start().trim_start_matches('r');
+        let is_docstring = open.unwrap_or(start.starts_with("\"\"\""));
+        if is_docstring || open.is_none() && start.starts_with('#') {
+            found.push((row + 1, line));
+        }
+        if line.matches("\"\"\"").count() % 2 == 1 {
+            open = if open.is_some() { None } else { Some(is_docstring) };
+        }
+    }
+    found
+}
+
 #[test]
 fn comment_lines_are_short() {
     let mut wrong = Vec::new();
+    for folder in ["python", "benchmarks", "tests", "examples", "docs"] {
+        for file in ["py", "pyi"].into_iter().flat_map(|ending| files(&root().join(folder), ending)) {
+            for (row, line) in python_comment_lines(&fs::read_to_string(&file).unwrap()) {
+                if line.chars().count() > MAX_COMMENT_LINE && !line.contains(" | ") {
+                    wrong.push(format!("{}:{row}", name_of(&file)));
+                }
+            }
+        }
+    }
     for folder in SOURCES.iter().chain(&["tests", "benches"]) {
         for file in files(&root().join(folder), "rs") {
             for (row, line) in fs::read_to_string(&file).unwrap().lines().enumerate() {
@@ -234,6 +261,8 @@ fn the_readers_find_what_they_look_for() {
     assert_eq!(rust_comments(rust), ["What is told."]);
     assert_eq!(declared(rust), ["sites", "Told"]);
     assert_eq!(python_comments("\"\"\"Told.\"\"\"\nx = 1  # asked\ny = 2\n"), ["Told.", "asked"]);
+    let python = "\"\"\"One.\n# two\n\"\"\"\nx = \"\"\"\nfour\n\"\"\"\n    # seven\n    r\"\"\"Eight.\"\"\"\n";
+    assert_eq!(python_comment_lines(python).iter().map(|(row, _)| *row).collect::<Vec<_>>(), [1, 2, 3, 7, 8]);
     let found = idioms(&words(&["As far as it is told, told well."]));
     assert_eq!((found["told"], found["as far as"]), (2, 1));
     assert_eq!(room(Path::new("src/flow/windowed/run.rs")), "src/flow/windowed");

@@ -1,6 +1,6 @@
-"""Edge disparity on the synthetic stereo scenes: density, errors and time of each pair of views, and the error of
-its row offset; the same for a right camera of another gain; and the row offset that a tracker keeps in sequences
-that begin without a scene and whose right camera is then moved."""
+"""Edge disparity on the synthetic stereo scenes: density, errors and time of each pair of views, and the
+error of its row offset; the same for a right camera of another gain; and the row offset that a tracker keeps
+in sequences that begin without a scene and whose right camera is then moved."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def row_error(estimate: float | None, truth: float) -> float:
 
 
 def sequence(seed: int, jump: float) -> Iterator[tuple[str, float]]:
-    """Errors of the row offset that a tracker keeps: views of noise and of a title, a scene, noise again, and the
-    same scene after the right camera moved."""
+    """Errors of the row offset that a tracker keeps: views of noise and of a title, a scene, noise again, and
+    the same scene after the right camera moved."""
     scene = replace(scenes.SCENES["small"](), seed=seed, steps=2)
     moved = replace(scene, row_offset=scene.row_offset + jump)
     noise, title = openings(scene.size, seed)

@@ -1,8 +1,9 @@
-"""Coarse-to-fine estimate between frames that are not equally bright, beside saturated pixels, over large motions, beside
-a motion boundary (of three frames too), beside a mask's edge and of undersampled texture: errors, px; share of errors
-above 1 px that neither status nor standard deviation states; share of frames of independent noise that is taken for motion; change by saturated pixels, standard deviations; bias of
-pairs in noise, px; errors in waves and in narrow frames, px; share of errors outside 95 % intervals, of undersampled
-texture and of discs that smoothness holds back, whose own errors are relative to their motion; time on equal frames."""
+"""Coarse-to-fine estimate between frames that are not equally bright, beside saturated pixels, over large
+motions, beside a motion boundary (of three frames too), beside a mask's edge and of undersampled texture:
+errors, px; share of errors above 1 px that neither status nor standard deviation states; share of the sites of
+independent noise that are valid; change by saturated pixels, standard deviations; bias of pairs in noise, px;
+errors in waves and in narrow frames, px; share of errors outside 95 % intervals, of undersampled texture and of
+discs that smoothness holds back, whose own errors are relative to their motion; time on equal frames."""
 
 from __future__ import annotations
 
@@ -96,8 +97,8 @@ def rows() -> dict[str, list[float]]:
 
 
 def disc(seed: int, angle: float) -> tuple[float, float]:
-    """Of the pixels of a disc before a still wall the share whose 95 % intervals of u miss its motion, a turn; and the
-    root-mean-square error of u as a share of that of the motion."""
+    """Of the pixels of a disc before a still wall the share whose 95 % intervals of u miss its motion, a
+    turn; and the root-mean-square error of u as a share of that of the motion."""
     picture, wall = steps.texture(seed), steps.moved(steps.texture(seed + 100), np.eye(2))
     y, x = (axis - centre for axis, centre in zip(np.mgrid[: steps.SIZE, : steps.SIZE], steps.CENTRE[::-1], strict=True))
     moved = [np.where(np.hypot(x, y) < RADIUS, steps.moved(picture, steps.turn(k * angle)), wall) for k in (0, 1)]

@@ -1,6 +1,6 @@
 """The gradient tracker on scenes with exact truth and, with JACOFLOW_DATA, on recordings: share of frames
-found, time; of discs whose boxes hold background the greatest errors of the position, px, and over their standard
-deviations."""
+found, time; of discs whose boxes hold background the greatest errors of the position, px, and over their
+standard deviations."""
 
 from __future__ import annotations
 
@@ -85,7 +85,8 @@ def tested() -> Iterator[tuple[str, Scene]]:
 
 
 def of_disc(kind: str, speed: float) -> tuple[float, float]:
-    """Greatest error of the position of a disc, px, and over its standard deviation, after the first frames."""
+    """Greatest error of the position of a disc, px, and over its standard deviation, after the first
+    frames."""
     target = disc(line((70.0, 128.0), (speed, 0.0)), np.full(len(TIMES), DISC_RADIUS), level=170.0)
     scene = Scene("disc", (Plane(kind, BACKGROUND),), target)
     found = jacoflow.track.track(scene.frames(), scene.start_box)

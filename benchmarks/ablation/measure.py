@@ -1,6 +1,7 @@
 """`measure` of regions with two motions, of turning discs and of a noisy plane: how well values and standard
-deviations fit the truth, and the share of regions without a dominant motion, of these and of waves, whose motion
-is not affine; and of regions for which a minority was taken: a third of them still, the rest moving or unrelated."""
+deviations fit the truth, and the share of regions without a dominant motion, of these and of waves, whose
+motion is not affine; and of regions for which a minority was taken: a third of them still, the rest moving or
+unrelated."""
 
 from __future__ import annotations
 
@@ -68,8 +69,8 @@ def measured(
 
 
 def add(found: dict[str, list[float]], row: str, motion: jacoflow.Measurement, truth: float) -> None:
-    """Adds the loss (negative logarithm of the normal density of the relative error, less its constant); that of
-    no motion is that of a standard deviation as large as the truth."""
+    """Adds the loss (negative logarithm of the normal density of the relative error, less its constant); that
+    of no motion is that of a standard deviation as large as the truth."""
     is_found = motion.status == "ok"
     found["none found"].append(float(not is_found))
     size = max(abs(truth), 0.01)

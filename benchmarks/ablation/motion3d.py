@@ -1,5 +1,5 @@
-"""3-D motion: wrong estimates with status `ok`, misses of their ellipsoids, lost estimates, errors and time of
-random scenes by group, and the time of a scene without any difficulty."""
+"""3-D motion: wrong estimates with status `ok`, misses of their ellipsoids, lost estimates, errors and time
+of random scenes by group, and the time of a scene without any difficulty."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ def plain(seed: int, n: int) -> coverage.Estimated:
 
 
 def exact(seed: int) -> coverage.Estimated:
-    """Two views without noise that turn fast, of a camera that moves by a fiftieth to a fifth of the depth."""
+    """Two views without noise that turn fast, of a camera that moves by a fiftieth to a fifth of the
+    depth."""
     rng = np.random.default_rng((seed, 78))
     make = claims.displaced(rng.choice([0.02, 0.1, 0.2]), rng.uniform(0.02, 0.3), seed, 200)
     found = motion3d.estimate_motion(make.points, make.flow, noise_std=1e-6, robust=True, threads=1)
@@ -62,7 +63,8 @@ def narrow(seed: int) -> coverage.Estimated:
 
 
 def few(seed: int) -> coverage.Estimated:
-    """20 points without outliers in much unknown noise: some of them agree by chance far better than all do."""
+    """20 points without outliers in much unknown noise: some of them agree by chance far better than all
+    do."""
     make = scenes.differential("uniform", "oblique", 20, 0.1, seed)
     found = motion3d.estimate_motion(make.points, make.flow, placement="start", robust=True, threads=1)
     return found, make.u, make.w

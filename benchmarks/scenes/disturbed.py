@@ -1,5 +1,5 @@
-"""What real recordings bring, on textures with exact flow: frames that are not equally bright, saturated pixels,
-motions of a quarter of the frame, detail that pixels do not resolve."""
+"""What real recordings bring, on textures with exact flow: frames that are not equally bright, saturated
+pixels, motions of a quarter of the frame, detail that pixels do not resolve."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def inner(plane: Array) -> Array:
 
 
 def specks(seed: int) -> tuple[list[NDArray[np.uint16]], list[NDArray[np.uint16]], NDArray[np.bool_]]:
-    """Three 12-bit frames that move by .25 px, the same with 20 saturated pixels in the middle one, and what is
-    farther than 20 px from these."""
+    """Three 12-bit frames that move by .25 px, the same with 20 saturated pixels in the middle one, and what
+    is farther than 20 px from these."""
     picture, rng = 1500 + 300 * texture(20 + seed, LARGE), np.random.default_rng(seed)
     views = [view(picture, (0.25 * t, 0), LARGE) for t in (-1, 0, 1)]
     clean = [np.rint(frame + 3 * rng.standard_normal(LARGE)).astype(np.uint16) for frame in views]
@@ -84,8 +84,8 @@ FOUND = np.s_[130:-150, 130:-150]
 
 
 def shifted_speckle(seed: int, shift: tuple[int, int]) -> list[Array]:
-    """Two frames of 400 x 400 px of fine speckle that moves by whole px, of up to 100; the coarsest levels of a
-    pyramid have nothing to follow."""
+    """Two frames of 400 x 400 px of fine speckle that moves by whole px, of up to 100; the coarsest levels of
+    a pyramid have nothing to follow."""
     speckle = gaussian_filter(np.random.default_rng(seed).standard_normal((620, 620)), 1.5)
     speckle = 128 + 40 * speckle / speckle.std()
     u, v = shift
@@ -93,8 +93,9 @@ def shifted_speckle(seed: int, shift: tuple[int, int]) -> list[Array]:
 
 
 def layered(seed: int, count: int = 2) -> tuple[list[Array], Array, Array]:
-    """A disc that moves before a ground at rest, both faintly textured: two frames, or three with one before; with
-    the flow of the last frame but one and the pixels within 10 px of the boundary that it and the last show."""
+    """A disc that moves before a ground at rest, both faintly textured: two frames, or three with one before;
+    with the flow of the last frame but one and the pixels within 10 px of the boundary that it and the last
+    show."""
     y, x = np.indices(SIZE).astype(float)
     middle, radius, move = (SIZE[1] / 2 - 3, SIZE[0] / 2), 55.0, (6.0, 2.0)
     ground, disc = 80 + 6 * texture(seed), 140 + 6 * texture(seed + 100)

@@ -20,8 +20,8 @@ def texture(seed: int) -> Array:
 
 
 def waves(seed: int) -> Array:
-    """A sum of 60 waves of 5 to 30 px in random directions about 128, standard deviation 25 grey levels, twice as
-    large as a frame: texture without fine detail."""
+    """A sum of 60 waves of 5 to 30 px in random directions about 128, standard deviation 25 grey levels,
+    twice as large as a frame: texture without fine detail."""
     rng, (y, x) = np.random.default_rng(seed), np.mgrid[: 2 * SIZE, : 2 * SIZE]
     directions = rng.normal(size=(60, 2))
     lengths = np.exp(rng.uniform(np.log(5), np.log(30), (60, 1)))

@@ -136,8 +136,8 @@ class Layer:
         )
 
     def disparity_at(self, x: Array, y: Array, pose: Pose, height: int) -> Array:
-        """Disparity (H, W) in px at places of the layer, in its own px from its centre; `x` and `y` may be one
-        row and one column."""
+        """Disparity (H, W) in px at places of the layer, in its own px from its centre; `x` and `y` may be
+        one row and one column."""
         bulge: Array | float = 0.0
         if self.relief:
             a, b = self.half

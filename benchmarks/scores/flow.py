@@ -90,9 +90,10 @@ def interior(truth: Array) -> Mask:
 
 
 def intervals(field: jacoflow.FlowField, truth: Array, truth_std: float = 0.0) -> dict[str, float]:
-    """Shares of 95 % intervals that hold: u, v and Jacobian (truth smoothed) in the interior, flow at all pixels with
-    a truth; mean squared normalised error of (u, v), 1 if the covariance is right; share of large errors that are
-    silent, and of pixels with large errors. `truth_std`, px, is the noise of the truth, which is part of the errors."""
+    """Shares of 95 % intervals that hold: u, v and Jacobian (truth smoothed) in the interior, flow at all
+    pixels with a truth; mean squared normalised error of (u, v), 1 if the covariance is right; share of large
+    errors that are silent, and of pixels with large errors. `truth_std`, px, is the noise of the truth, which
+    is part of the errors."""
     where, known = interior(truth), np.isfinite(truth).all(axis=-1)
     error, std = field.flow - truth, np.stack([field.std("u"), field.std("v")], axis=-1)
     of_error = field.covariance[where][:, :2, :2] + truth_std**2 * np.eye(2)

@@ -19,7 +19,8 @@ WINDOWS = (3.0, 4.5, 6.5, 9.0, 12.5, 18.0, 27.0)
 
 
 def moments(plane: Array, weights: Array, offsets: Array, power: int, axis: int) -> Array:
-    """`sum_d weight(d) d^power plane(p + d)` at every pixel p along one axis; nothing lies beyond the edge."""
+    """`sum_d weight(d) d^power plane(p + d)` at every pixel p along one axis; nothing lies beyond the
+    edge."""
     from scipy.ndimage import correlate1d
 
     return correlate1d(plane, weights * offsets**power, axis=axis, mode="constant")

@@ -107,8 +107,8 @@ def kitti(path: Path) -> Array:
 
 
 def recordings(data: Path | None) -> list[Row]:
-    """The pair of unequal brightness: median distance from window correlation, px. Driving: mean end-point error,
-    px, and share of pixels that are off by more than 3 px and 5 %."""
+    """The pair of unequal brightness: median distance from window correlation, px. Driving: mean end-point
+    error, px, and share of pixels that are off by more than 3 px and 5 %."""
     if data is None or samples.cv2 is None:
         return []
     rows: list[Row] = []

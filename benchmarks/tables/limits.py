@@ -1,5 +1,5 @@
-"""How far a step from frame to frame may go, beside OpenCV; how close two motions in a region may be, how small an
-object, and how much noise there may be.
+"""How far a step from frame to frame may go, beside OpenCV; how close two motions in a region may be, how
+small an object, and how much noise there may be.
 
     python -m benchmarks.tables.limits [--quick]
 """
@@ -125,8 +125,8 @@ def unrelated(seeds: tuple[int, ...]) -> list[Row]:
 
 
 def turning_waves(seeds: tuple[int, ...]) -> list[Row]:
-    """Turns of a texture without fine detail under a grey level of noise: shares of the sites inside the frame that
-    are `valid`, and of silent ones, as in `limits`."""
+    """Turns of a texture without fine detail under a grey level of noise: shares of the sites inside the
+    frame that are `valid`, and of silent ones, as in `limits`."""
     rows: list[Row] = []
     inside = (slice(MARGIN, -MARGIN),) * 2
     for degrees in TURNS[:3]:
@@ -152,8 +152,8 @@ def eight_bit(frame: NDArray[np.float64], noise: float, rng: np.random.Generator
 
 
 def two_motions(seeds: tuple[int, ...]) -> list[Row]:
-    """`measure` of a square of which one half moves by `difference` px and the other stands still: distance of
-    (u, u_x) from the nearer motion, with the stated standard deviations, root mean squares."""
+    """`measure` of a square of which one half moves by `difference` px and the other stands still: distance
+    of (u, u_x) from the nearer motion, with the stated standard deviations, root mean squares."""
     rows: list[Row] = []
     for difference in DIFFERENCES:
         found = []
@@ -175,8 +175,8 @@ def two_motions(seeds: tuple[int, ...]) -> list[Row]:
 
 
 def turning_discs(seeds: tuple[int, ...]) -> list[Row]:
-    """Textured discs that turn before a textured wall that stands still, from a pair: `measure` of the angular
-    velocity 3 px inside their edges, as shares of the truth, medians."""
+    """Textured discs that turn before a textured wall that stands still, from a pair: `measure` of the
+    angular velocity 3 px inside their edges, as shares of the truth, medians."""
     rows: list[Row] = []
     y, x = np.mgrid[: steps.SIZE, : steps.SIZE]
     for radius in RADII:
@@ -199,7 +199,8 @@ def turning_discs(seeds: tuple[int, ...]) -> list[Row]:
 
 
 def noise(seeds: tuple[int, ...]) -> list[Row]:
-    """Means over a square of a texture that moves by a fraction of a pixel and grows by a hundredth, from a pair:
+    """Means over a square of a texture that moves by a fraction of a pixel and grows by a hundredth, from a
+    pair:
     errors of u and of the divergence as shares of the truth, with the stated ones, root mean squares."""
     rows: list[Row] = []
     for level in NOISES:
@@ -218,8 +219,8 @@ def noise(seeds: tuple[int, ...]) -> list[Row]:
 
 
 def other_methods(seeds: tuple[int, ...]) -> list[Row]:
-    """What `measure` says of a region of fine texture that turns, by the method of the field: value, its standard
-    deviation and that of the values, as shares of the truth."""
+    """What `measure` says of a region of fine texture that turns, by the method of the field: value, its
+    standard deviation and that of the values, as shares of the truth."""
     rows: list[Row] = []
     for method, name in METHODS.items():
         found = []

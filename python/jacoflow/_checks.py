@@ -50,7 +50,8 @@ def known_options(function: str, kind: type, options: Iterable[str]) -> None:
 
 
 def numbers(name: str, value: Any, expected: str, shape: tuple[int | None, ...] | None = None) -> NDArray[np.float64]:
-    """Real numbers, in their unit, as an array of a shape in which None is any length; without `shape` of any."""
+    """Real numbers, in their unit, as an array of a shape in which None is any length; without `shape` of
+    any."""
     try:
         array = np.asarray(value)
     except ValueError:
@@ -82,7 +83,8 @@ def converted(name: str, value: Any, convert: Callable[[Any], Any], expected: st
 
 
 def word(name: str, value: Any, expected: str) -> str:
-    """A word, no unit; ValueError by name for another object. The compiled part knows which words there are."""
+    """A word, no unit; ValueError by name for another object. The compiled part knows which words there
+    are."""
     if not is_word(value):
         raise ValueError(f"{name}: expected {expected}, got {value!r}")
     return str(value)

@@ -1,4 +1,5 @@
-"""Frames of video as they are coded: luma, depth, whether there is colour, and the rotation of the display."""
+"""Frames of video as they are coded: luma, depth, whether there is colour, and the rotation of the
+display."""
 
 from __future__ import annotations
 
@@ -23,8 +24,8 @@ def upright(image: NDArray[Any], frame: Any) -> NDArray[Any]:
 
 
 def luma(frame: Any) -> NDArray[Any]:
-    """Luma as coded, (H, W): uint8, or uint16 where it is deeper, shifted to the full scale of 16 bits. Packed
-    and RGB formats are converted by ITU-R BT.601, limited range, as by ffmpeg."""
+    """Luma as coded, (H, W): uint8, or uint16 where it is deeper, shifted to the full scale of 16 bits.
+    Packed and RGB formats are converted by ITU-R BT.601, limited range, as by ffmpeg."""
     return _plane(_planar(frame), 0)
 
 

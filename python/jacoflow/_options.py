@@ -33,15 +33,15 @@ class CoarseToFine:
 
     method: ClassVar[str] = "coarse_to_fine"
     preset: Literal["fast", "balanced", "accurate"] | None = None
-    """Cost against error; default "balanced". "fast" finds the motion at half the resolution and loses detail of
-    a few px; "accurate" iterates more."""
+    """Cost against error; default "balanced". "fast" finds the motion at half the resolution and loses detail
+    of a few px; "accurate" iterates more."""
     levels: int | None = None
     """Pyramid levels; default as many as the frame allows."""
     time_scheme: Literal["forward", "central", "pair"] | None = None
-    """How time derivatives are taken. "forward" (default): motion from the middle frame of three to the next one;
-    the frame before it helps where the motion is steady. "central": mean of the steps before and after, the
-    velocity at the middle frame. "pair": motion from the first of two frames to the second, the default where
-    there are only two."""
+    """How time derivatives are taken. "forward" (default): motion from the middle frame of three to the next
+    one; the frame before it helps where the motion is steady. "central": mean of the steps before and after,
+    the velocity at the middle frame. "pair": motion from the first of two frames to the second, the default
+    where there are only two."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,8 +180,8 @@ class FilterProfile:
     R: float | None = None
     """Measurement noise: variance of one pixel, 8-bit grey levels squared."""
     adaptive: bool | None = None
-    """Take the noise from the residual of each fit where it exceeds that of `R`, and start the brightness anew
-    where a frame contradicts the prediction; default True. False: the patent's filter for all frames."""
+    """Take the noise from the residual of each fit where it exceeds that of `R`, and start the brightness
+    anew where a frame contradicts the prediction; default True. False: the patent's filter for all frames."""
     x0: ArrayLike | None = None
     """Mean before the first frame, shape (12,)."""
     P0: ArrayLike | None = None

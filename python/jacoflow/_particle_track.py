@@ -164,7 +164,8 @@ class ParticleTracker:
     ----------
     frame : array (H, W, 3) of uint8, uint16, float32 or float64, red, green, blue
         The first frame, at least 8 x 8 px. White is 255 or 65535; of floats it is 1, or 255 from the
-        first frame on that holds such levels. Pixels that are masked (numpy.ma) or not finite are not counted.
+        first frame on that holds such levels. Pixels that are masked (numpy.ma) or not finite are not
+        counted.
     boxes : array (K, 4) or dict id -> box
         Left, top, width, height, px, of the targets in it; rows have the ids 0 to K - 1. May be empty. A box
         may reach over the border. The colours of a box are compared in 8 bands from top to bottom; one of

@@ -67,7 +67,8 @@ class FrameReader:
     @property
     def frame_rate(self) -> float | None:
         """Frames per second as read (with `step` taken into account), where the source says so, else None: of
-        video and Y4M the header's, of TIFF those of ImageJ (finterval, else fps) and OME-XML (TimeIncrement)."""
+        video and Y4M the header's, of TIFF those of ImageJ (finterval, else fps) and OME-XML
+        (TimeIncrement)."""
         return self._source.frame_rate
 
     @property

@@ -51,7 +51,8 @@ class Stack:
 
 
 def _samples(frame: Frame, request: Request) -> Frame:
-    """A frame in the dtype of frames that holds its samples exactly, as of .npy files; in native byte order."""
+    """A frame in the dtype of frames that holds its samples exactly, as of .npy files; in native byte
+    order."""
     kind, size = frame.dtype.kind, frame.dtype.itemsize
     if kind not in "biuf" or size > 8:
         raise FormatError(f"{request.source}: holds samples of type {frame.dtype}; expected integers or floats of up to 64 bits")

@@ -23,7 +23,8 @@ _NODE = 60.0
 
 
 def identity_colours(numbers: ArrayLike) -> NDArray[np.float64]:
-    """Colours of track or group numbers (N,), array (N, 3), 0 to 1 (no unit): the same number always has the same one."""
+    """Colours of track or group numbers (N,), array (N, 3), 0 to 1 (no unit): the same number always has the
+    same one."""
     hues = np.asarray(numbers, float) * _GOLDEN % 1.0
     corners = np.abs((hues[..., None] * 6 + np.array([0.0, 4.0, 2.0])) % 6 - 3) - 1
     colours: NDArray[np.float64] = 0.15 + 0.8 * np.clip(corners, 0, 1)
@@ -31,7 +32,8 @@ def identity_colours(numbers: ArrayLike) -> NDArray[np.float64]:
 
 
 def disparity(found: EdgeDisparity, *, left: ArrayLike | None = None, axes: Axes | None = None, limits: tuple[float, float] | None = None) -> Axes:
-    """Draws the N edge pixels of an `EdgeDisparity` coloured by disparity, px, over `left`, a grey array (H, W), if given; `limits` (least, greatest), px, of the colours."""
+    """Draws the N edge pixels of an `EdgeDisparity` coloured by disparity, px, over `left`, a grey array (H,
+    W), if given; `limits` (least, greatest), px, of the colours."""
     check_parts("found", found, "EdgeDisparity", ("disparity", "rows", "cols", "values"))
     if limits is not None:
         limits = tuple(numbers("limits", limits, "two numbers, least and greatest", (2,)))
@@ -47,7 +49,8 @@ def disparity(found: EdgeDisparity, *, left: ArrayLike | None = None, axes: Axes
 
 
 def clusters(step: StereoStep, *, left: ArrayLike | None = None, axes: Axes | None = None, by: str = "track", arrows: float = 1.0) -> Axes:
-    """Draws the N edge pixels of a `StereoStep` in the colours of their tracks or groups (`by` "track" or "group"), with the number of each, over `left`, a grey array (H, W).
+    """Draws the N edge pixels of a `StereoStep` in the colours of their tracks or groups (`by` "track" or
+    "group"), with the number of each, over `left`, a grey array (H, W).
 
     Arrows are `arrows` times the motion since the last step, px; 0 draws none.
     """
@@ -72,8 +75,9 @@ def clusters(step: StereoStep, *, left: ArrayLike | None = None, axes: Axes | No
 
 
 def track_graph(graph: TrackGraph, *, axes: Axes | None = None, threshold: float = 0.4) -> Axes:
-    """Draws a `TrackGraph` over time: steps to the right, a row for each component (no unit); nodes in the colour of their track, as large as their number of pixels; arcs with a score of
-    at least `threshold` (0 to 2), as thick as their score."""
+    """Draws a `TrackGraph` over time: steps to the right, a row for each component (no unit); nodes in the
+    colour of their track, as large as their number of pixels; arcs with a score of at least `threshold` (0 to
+    2), as thick as their score."""
     check_parts("graph", graph, "TrackGraph", ("nodes", "arcs"))
     threshold = real_number("threshold", threshold)
     axes = axes_or_new(axes)

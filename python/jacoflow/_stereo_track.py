@@ -22,7 +22,9 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class StereoCluster(Brief):
-    """A cluster of edge pixels at one step. Lengths in px of the left view, depths as disparity (px), times in steps (velocities, per step: for the unit of the tracker's `step_time`, which by default is one); NaN where nothing was measured."""
+    """A cluster of edge pixels at one step. Lengths in px of the left view, depths as disparity (px), times
+    in steps (velocities, per step: for the unit of the tracker's `step_time`, which by default is one); NaN
+    where nothing was measured."""
 
     time: int
     """Step, from 0 (no unit)."""
@@ -39,25 +41,36 @@ class StereoCluster(Brief):
     mean: Array
     """Mean (x, y) of the component, and the median disparity of the cluster's pixels, (3,), px."""
     covariance: Array
-    """Covariance of (x, y, disparity), (3, 3), px^2: the component's, and a twelfth of a cell and of a disparity squared for what counting in voxels hides."""
+    """Covariance of (x, y, disparity), (3, 3), px^2: the component's, and a twelfth of a cell and of a
+    disparity squared for what counting in voxels hides."""
     velocity: Array
-    """Motion (u, v, w) since the last step, (3,), px/step and disparity/step: at `middle`, which `affine` begins with, and in depth the robust mean over its pixels. Of what grows or turns, `affine` says what each pixel does."""
+    """Motion (u, v, w) since the last step, (3,), px/step and disparity/step: at `middle`, which `affine`
+    begins with, and in depth the robust mean over its pixels. Of what grows or turns, `affine` says what each
+    pixel does."""
     next_velocity: Array
-    """Motion (u, v, w) to the next step, (3,), px/step and disparity/step, at `middle` and in depth the robust mean; known in the graph one step later, NaN before."""
+    """Motion (u, v, w) to the next step, (3,), px/step and disparity/step, at `middle` and in depth the
+    robust mean; known in the graph one step later, NaN before."""
     middle: Array
-    """Medians along x and y, (2,), px, of its pixels; in "improved" of those on its own surface, without outliers and pixels of its outline that lie beyond it: so `velocity` is the median of the affine motion over these."""
+    """Medians along x and y, (2,), px, of its pixels; in "improved" of those on its own surface, without
+    outliers and pixels of its outline that lie beyond it: so `velocity` is the median of the affine motion
+    over these."""
     affine: Array
-    """Motion in the picture since the last step as (u, v, u_x, v_x, u_y, v_y) at `middle`, (6,), px/step and 1/step ("improved")."""
+    """Motion in the picture since the last step as (u, v, u_x, v_x, u_y, v_y) at `middle`, (6,), px/step and
+    1/step ("improved")."""
     next_affine: Array
-    """Motion in the picture to the next step, in the same way, (6,), px/step and 1/step; known in the graph one step later."""
+    """Motion in the picture to the next step, in the same way, (6,), px/step and 1/step; known in the graph
+    one step later."""
     residual: float
-    """Truncated mean absolute difference of brightness that the motion leaves, in grey levels of 8 bits; one such level is the unit."""
+    """Truncated mean absolute difference of brightness that the motion leaves, in grey levels of 8 bits; one
+    such level is the unit."""
     coasting: bool
-    """Whether the motion is an extrapolation, because what was measured jumped or could not be measured (no unit)."""
+    """Whether the motion is an extrapolation, because what was measured jumped or could not be measured (no
+    unit)."""
     depth: float
     """Depth Z = f B / (d - d_infinity), in units of the baseline's; NaN unless the cameras are known."""
     metric_velocity: Array
-    """Velocity (X, Y, Z) since the last step, (3,), in units of the baseline's per step; NaN unless the cameras are known."""
+    """Velocity (X, Y, Z) since the last step, (3,), in units of the baseline's per step; NaN unless the
+    cameras are known."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,11 +94,14 @@ class StereoStep(Rows):
     cluster_of_pixel: NDArray[np.uint32]
     """`index` of the cluster that each belongs to, (N,), no unit."""
     left_out: int
-    """Disparities farther than 1.5 px outside of `disparity_range` (of the layers of `grid`, where these are more), which took no part; no unit."""
+    """Disparities farther than 1.5 px outside of `disparity_range` (of the layers of `grid`, where these are
+    more), which took no part; no unit."""
     row_offset: float
-    """How many rows lower the right view shows a point, px, as these views were matched; NaN where disparities were given."""
+    """How many rows lower the right view shows a point, px, as these views were matched; NaN where
+    disparities were given."""
     rows_doubtful: bool
-    """Whether the row offset was searched and the views disagree with it: many disparities are wrong (no unit)."""
+    """Whether the row offset was searched and the views disagree with it: many disparities are wrong (no
+    unit)."""
     rounds: int
     """Rounds of the mixture, no unit."""
 
@@ -101,15 +117,19 @@ class StereoTrack(Rows):
     positions: Array
     """`mean` (x, y, disparity) of its cluster there, (T, 3), px."""
     velocities: Array
-    """Motion (u, v, w) since the step before, (T, 3), px/step and disparity/step (for the unit of time, if that is no step); NaN where not measured."""
+    """Motion (u, v, w) since the step before, (T, 3), px/step and disparity/step (for the unit of time, if
+    that is no step); NaN where not measured."""
     clock: Array
-    """When that was, time since the first step, (T,), in the unit of the tracker's `step_time`: `times` unless `dt` was given."""
+    """When that was, time since the first step, (T,), in the unit of the tracker's `step_time`: `times`
+    unless `dt` was given."""
 
 
 class TrackGraph:
-    """Clusters of all steps and the arcs between them: equation (33) of the stereo paper. Nodes are pairs (step, component), no unit.
+    """Clusters of all steps and the arcs between them: equation (33) of the stereo paper. Nodes are pairs
+    (step, component), no unit.
 
-    An arc's score is `e(k, k') = e(k -> k') + e(k <- k')`, 0 to 2: the shares of both clusters' voxels that meet the other one, forwards and backwards in time.
+    An arc's score is `e(k, k') = e(k -> k') + e(k <- k')`, 0 to 2: the shares of both clusters' voxels that
+    meet the other one, forwards and backwards in time.
     """
 
     def __init__(self, compiled: _TrackGraph | None = None) -> None:
@@ -127,7 +147,8 @@ class TrackGraph:
         return {((time, start), (time + 1, end)): (forward, backward) for time, start, end, forward, backward in self._graph.arcs()}
 
     def follow(self, t: int, k: int, threshold: float = 0.4, backward: bool = False) -> list[tuple[int, int]]:
-        """A track: the clusters (step, component), no unit, reached from (t, k) along arcs whose score is at least `threshold`, itself among them.
+        """A track: the clusters (step, component), no unit, reached from (t, k) along arcs whose score is at
+        least `threshold`, itself among them.
 
         Raises
         ------
@@ -140,9 +161,12 @@ class TrackGraph:
         return self._graph.follow(time, index, real_number("threshold", threshold), switch("backward", backward))
 
     def to_networkx(self, flat: bool = False) -> _networkx.DiGraph[tuple[int, int]]:
-        """As a `networkx.DiGraph`: nodes (step, component) with the attributes of `StereoCluster` (px, steps), edges with `forward`, `backward`, 0 to 1, and `score`.
+        """As a `networkx.DiGraph`: nodes (step, component) with the attributes of `StereoCluster` (px,
+        steps), edges with `forward`, `backward`, 0 to 1, and `score`.
 
-        Arrays are lists there, which networkx' JSON (`node_link_data`) can hold. `flat`: every number is an attribute by itself, `mean_0` to `mean_2`, `covariance_0_0` and so on, which the formats that know no lists need (GraphML, GEXF, GML).
+        Arrays are lists there, which networkx' JSON (`node_link_data`) can hold. `flat`: every number is an
+        attribute by itself, `mean_0` to `mean_2`, `covariance_0_0` and so on, which the formats that know no
+        lists need (GraphML, GEXF, GML).
 
         Raises
         ------
@@ -166,7 +190,9 @@ class TrackGraph:
 
     @classmethod
     def from_json(cls, text: str) -> TrackGraph:
-        """From the text that `to_json` gives, number for number; lengths in px. Raises `ValueError` naming `json` for any other text, and for a cluster or an arc that is there twice; `TypeError` for what is no text."""
+        """From the text that `to_json` gives, number for number; lengths in px. Raises `ValueError` naming
+        `json` for any other text, and for a cluster or an arc that is there twice; `TypeError` for what is no
+        text."""
         if not isinstance(text, str):
             raise TypeError(f"json: expected a text (str), got {type(text).__name__}")
         return cls(_TrackGraph.from_json(text))
@@ -200,31 +226,42 @@ def _flat(node: dict[str, Any]) -> dict[str, Any]:
 
 
 class StereoTracker:
-    """Tracks all moving objects before two cameras, which may move themselves: nothing is learnt or marked beforehand.
+    """Tracks all moving objects before two cameras, which may move themselves: nothing is learned or marked
+    beforehand.
 
-    Source: the stereo paper ("tracking of moving objects in stereo sequences by fusing disparity and luminance", with a variational mixture of Gaussians). Edge pixels with a disparity are counted in voxels of (x, y, disparity), clustered by
-    a mixture weighted with the counts, and followed to the next step in the picture and in depth; overlaps of the clusters in both directions of time are arcs of a graph. It is deterministic for any number of threads.
-    It pickles, also in mid-stream.
+    Source: the stereo paper ("tracking of moving objects in stereo sequences by fusing disparity and
+    luminance", with a variational mixture of Gaussians). Edge pixels with a disparity are counted in voxels
+    of (x, y, disparity), clustered by a mixture weighted with the counts, and followed to the next step in
+    the picture and in depth; overlaps of the clusters in both directions of time are arcs of a graph. It is
+    deterministic for any number of threads. It pickles, also in mid-stream.
 
     Parameters
     ----------
     mode : "improved" or "paper"
-        "improved" (default): motion is measured to fractions of a pixel by affine Lucas-Kanade and carries the mixture's components along, so that a component is a track; hidden tracks are recognised, clusters that move alike are grouped; the exposure of both cameras may change from step to step.
-        "paper": the paper's text, with a new mixture at each step, motion in whole cells and tracks along the strongest arcs.
+        "improved" (default): motion is measured to fractions of a pixel by affine Lucas-Kanade and carries
+        the mixture's components along, so that a component is a track; hidden tracks are recognised, clusters
+        that move alike are grouped; the exposure of both cameras may change from step to step.
+        "paper": the paper's text, with a new mixture at each step, motion in whole cells and tracks along the
+        strongest arcs.
     n_components : int
-        Components of the mixture; default 16 ("paper": 12). One cluster moves affinely: where that is true of small pieces only, as of a street seen from a car, take 48 or so, and a larger `search`.
+        Components of the mixture; default 16 ("paper": 12). One cluster moves affinely: where that is true of
+        small pieces only, as of a street seen from a car, take 48 or so, and a larger `search`.
     disparity_range, row_range : (int, int), px
         Smallest and largest disparity, and row offset of the right view, that are searched.
     row_offset : float, px
-        Row offset; default: estimated at the first suitable step and again where later ones contradict it ("improved"), or searched at every pixel ("paper").
+        Row offset; default: estimated at the first suitable step and again where later ones contradict it
+        ("improved"), or searched at every pixel ("paper").
     grid : (rows, columns, layers)
-        Cells along y and x over the picture, and layers of one disparity each; layers None: the length of `disparity_range`, and no fewer.
+        Cells along y and x over the picture, and layers of one disparity each; layers None: the length of
+        `disparity_range`, and no fewer.
     search : int
-        How far templates and depths are searched, cells and disparities; default 8. A larger change of disparity in one step is not measured.
+        How far templates and depths are searched, cells and disparities; default 8. A larger change of
+        disparity in one step is not measured.
     camera : StereoCamera
         The cameras. With them, clusters have a depth and a velocity in space.
     step_time : float
-        Time between ordinary steps, in the unit of `dt` in `update` and of velocities; default 1: steps. With times in seconds and 30 frames a second, give 1/30.
+        Time between ordinary steps, in the unit of `dt` in `update` and of velocities; default 1: steps. With
+        times in seconds and 30 frames a second, give 1/30.
     random_state : int
         Seed of the fits.
     threads : int
@@ -267,22 +304,30 @@ class StereoTracker:
         self._disparity_range, self._row_range = given["disparity_range"], given["row_range"]
 
     def update(self, left: ArrayLike, right: ArrayLike, dt: float | None = None) -> StereoStep:
-        """The next step from both views, arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64, at least 17 px along each axis and as large as those before.
+        """The next step from both views, arrays (H, W) or (H, W, 3) of uint8, uint16, float32 or float64, at
+        least 17 px along each axis and as large as those before.
 
-        Pixels that are masked (numpy.ma) or not finite leave no edges round them; views without edges give a step without clusters. Of videos, `zip(video.frames(left), video.frames(right))` makes pairs; frames that hold both views are
-        cut by `numpy.split(frame, 2, axis=1)` (side by side) or `axis=0` (top-bottom); where each was squeezed to half its width or height, disparities and motion along that axis are in squeezed pixels (the binary stretches them: `--layout half-side-by-side`).
+        Pixels that are masked (numpy.ma) or not finite leave no edges round them; views without edges give a
+        step without clusters. Of videos, `zip(video.frames(left), video.frames(right))` makes pairs; frames
+        that hold both views are cut by `numpy.split(frame, 2, axis=1)` (side by side) or `axis=0`
+        (top-bottom); where each was squeezed to half its width or height, disparities and motion along that
+        axis are in squeezed pixels (the binary stretches them: `--layout half-side-by-side`).
 
-        `dt`: time since the last step, in the unit of `step_time`, from a millionth to a million of it; default one ordinary step, 2 where a frame is missing. Velocities are then still for the unit of time; predictions and limits in steps refer to that time. Of the first step it means nothing.
+        `dt`: time since the last step, in the unit of `step_time`, from a millionth to a million of it;
+        default one ordinary step, 2 where a frame is missing. Velocities are then still for the unit of time;
+        predictions and limits in steps refer to that time. Of the first step it means nothing.
 
         Raises
         ------
         ValueError
-            For views of different size or of another size than before, naming both shapes, and a `dt` that is not above 0 or out of its range.
+            For views of different size or of another size than before, naming both shapes, and a `dt` that is
+            not above 0 or out of its range.
 
         Warns
         -----
         UserWarning
-            Where views with edges disagree at every row offset in `row_range`; the disparities are then mostly wrong.
+            Where views with edges disagree at every row offset in `row_range`; the disparities are then
+            mostly wrong.
         """
         step = _step(self._tracker.update(*checked_views(left, right), _waited(dt)))
         if step.rows_doubtful:
@@ -290,9 +335,11 @@ class StereoTracker:
         return step
 
     def update_disparity(self, left: ArrayLike, disparity: ArrayLike, dt: float | None = None) -> StereoStep:
-        """The next step from the left view (H, W) and disparities found elsewhere, (H, W), px, `x_left - x_right`, NaN for pixels that shall take no part; `dt` as in `update`.
+        """The next step from the left view (H, W) and disparities found elsewhere, (H, W), px, `x_left -
+        x_right`, NaN for pixels that shall take no part; `dt` as in `update`.
 
-        Disparities farther than 1.5 px outside of the layers of the grid, which are those of `disparity_range` unless `grid` has more, take no part either: `StereoStep.left_out` counts them.
+        Disparities farther than 1.5 px outside of the layers of the grid, which are those of
+        `disparity_range` unless `grid` has more, take no part either: `StereoStep.left_out` counts them.
 
         Raises
         ------
@@ -312,7 +359,8 @@ class StereoTracker:
 
     @property
     def row_offset(self) -> float | None:
-        """How many rows lower the right view shows a point, px: the one given, or what was found as long as the views agree with it; None where nothing is known ("classes" searches it at every pixel)."""
+        """How many rows lower the right view shows a point, px: the one given, or what was found as long as
+        the views agree with it; None where nothing is known ("classes" searches it at every pixel)."""
         return self._tracker.row_offset()
 
     @property

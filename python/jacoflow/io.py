@@ -64,10 +64,10 @@ def frames(
 
     `source`: a folder of PNG, TIFF, BMP, PGM, PPM and JPEG files (natural order), a pattern such as
     "frames/*.png", one image, a .txt list of images, a .y4m file, "-" (Y4M on standard input), a .npy stack
-    (T, H, W) or (T, H, W, 3), a .npz or HDF5 file (.h5, with h5py) with such a stack, a MATLAB file (.mat, with
-    scipy or, from version 7.3 on, h5py) with an array (H, W, T), or a video (through PyAV, else through an
-    ffmpeg on the PATH; see also `jacoflow.video`). `key`: the name of the array where a file holds several.
-    Frames `start`, `start + step`, ... below `stop` (indices, no unit); default all.
+    (T, H, W) or (T, H, W, 3), a .npz or HDF5 file (.h5, with h5py) with such a stack, a MATLAB file (.mat,
+    with scipy or, from version 7.3 on, h5py) with an array (H, W, T), or a video (through PyAV, else through
+    an ffmpeg on the PATH; see also `jacoflow.video`). `key`: the name of the array where a file holds
+    several. Frames `start`, `start + step`, ... below `stop` (indices, no unit); default all.
 
     The pages of a TIFF file (also BigTIFF) are its frames, those of reduced resolution aside. Where ImageJ or
     OME-XML name channels or slices, `channel` and `z` (indices) choose one of each, and without them the file
@@ -76,8 +76,8 @@ def frames(
     those of wider integers as float64 (`FormatError` beyond 2^53). Other kinds of TIFF are read through
     tifffile where that is installed, else refused with `MissingDependencyError`.
 
-    TIFF, Y4M and .npy files are recognised by their first bytes under any name, other files by the name, which
-    must be UTF-8. Recordings that no installed package helps with (.raw, .cih, .cine) are refused with
+    TIFF, Y4M and .npy files are recognised by their first bytes under any name, other files by the name,
+    which must be UTF-8. Recordings that no installed package helps with (.raw, .cih, .cine) are refused with
     `FormatError`, which says how to convert them.
 
     Frames are grey, arrays (H, W); colour is refused unless `colour="luminance"`. With `colour="rgb"` they
@@ -88,9 +88,9 @@ def frames(
 
     Levels are the file's where its white is 255 or 65535, or unknown (floats, arrays); others are brought to
     the white of uint8 or uint16 (PNM of another maximum, PNG and TIFF of under 8 bits, Y4M of 9 to 15). TIFF
-    of 12 bits keeps its levels, 0 to 4095 in uint16. Video is luma as coded, most often 16 to 235, that of RGB
-    (GIF) too; where it is cut off amid a frame it ends with `FormatError`. JPEG and PNG are turned as their
-    EXIF data say for the display, TIFF is not.
+    of 12 bits keeps its levels, 0 to 4095 in uint16. Video is luma as coded, most often 16 to 235, that of
+    RGB (GIF) too; where it is cut off amid a frame it ends with `FormatError`. JPEG and PNG are turned as
+    their EXIF data say for the display, TIFF is not.
 
     >>> import tempfile, numpy as np
     >>> from jacoflow import io
@@ -106,9 +106,9 @@ def frames(
 def write_frames(path: _Path, frames: Iterable[NDArray[Any]], *, frame_rate: float = 25.0) -> int:
     """Writes frames (H, W), or (H, W, 3) in colour, of one size and dtype, in their levels; returns how many.
 
-    `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16), which
-    appear together, at the end, and replace those of an earlier call.
-    `frame_rate` in frames/s is noted where the format has room for it.
+    `path`: *.npy (any dtype), *.y4m (uint8, uint16), or a folder for numbered PNG files (uint8, uint16),
+    which appear together, at the end, and replace those of an earlier call. `frame_rate` in frames/s is noted
+    where the format has room for it.
     """
     return _write_frames(path, frames, frame_rate)
 
@@ -164,8 +164,8 @@ def read_disparity(path: _Path) -> NDArray[np.float32]:
 
 
 def write_disparity(path: _Path, disparity: ArrayLike) -> int:
-    """Writes disparity (H, W), px, NaN or infinite where there is none, by the name's ending; returns how many
-    values the format could not hold.
+    """Writes disparity (H, W), px, NaN or infinite where there is none, by the name's ending; returns how
+    many values the format could not hold.
 
     .npz and .pfm hold all; .png is the KITTI benchmark's, 16 bit in steps of 1/256 px, for disparities above
     0 and below 256 px.

@@ -204,7 +204,8 @@ class VariationalGaussianMixture(PointMixture):
         return self
 
     def score_samples(self, X: ArrayLike) -> Array:
-        """How well points (N, D) are explained, (N,): `ln sum_k rho_nk` of equation (14), natural logarithm, as scikit-learn returns it.
+        """How well points (N, D) are explained, (N,): `ln sum_k rho_nk` of equation (14), natural logarithm,
+        as scikit-learn returns it.
 
         Expected logarithms make it less than the log of a density, by the more the fewer points the
         components have.

@@ -60,7 +60,8 @@ def flow_image(field: FieldLike, *, max_speed: float | None = None) -> NDArray[n
     """Colours of a flow, uint8 array (H, W, 3): direction is hue (right red, down yellow), speed is
     saturation, at rest is white, unknown is black.
 
-    `max_speed` (px/frame, or the field's unit) is the speed of full saturation, by default the 99th percentile; faster is darker.
+    `max_speed` (px/frame, or the field's unit) is the speed of full saturation, by default the 99th
+    percentile; faster is darker.
     """
     flow = _flow(field)
     return _colours(flow[..., 0], flow[..., 1], _full_speed(flow, max_speed))
@@ -79,8 +80,8 @@ def wheel_image(size: int = 96) -> NDArray[np.uint8]:
 
 
 def flow_colour(field: FieldLike, *, axes: Axes | None = None, max_speed: float | None = None, legend: bool = True) -> Axes:
-    """Draws `flow_image` of a flow (H, W, 2), px/frame or the field's unit; `legend` adds the colour wheel with its full speed
-    in the lower right corner."""
+    """Draws `flow_image` of a flow (H, W, 2), px/frame or the field's unit; `legend` adds the colour wheel
+    with its full speed in the lower right corner."""
     axes = axes_or_new(axes)
     image = flow_image(field, max_speed=max_speed)
     axes.imshow(image, extent=_extent(field, image.shape[:2]), interpolation="nearest")

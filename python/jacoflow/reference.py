@@ -1,4 +1,5 @@
-"""The loop of the gradient tracker's source, to the letter and with repairs, and its parts: for comparison with `jacoflow.track.GradientTracker`.
+"""The loop of the gradient tracker's source, to the letter and with repairs, and its parts: for comparison
+with `jacoflow.track.GradientTracker`.
 
 Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method" (IPSJ). A
 user's wheel is built without it; `maturin develop --features reference` builds it.
@@ -40,16 +41,19 @@ class ReferenceResult(TrackResult):
 
 
 class ReferenceTracker(GradientTracker):
-    """Follows one target by local flow in a moving window, its mean over what moves and a Gauss-Markov filter.
+    """Follows one target by local flow in a moving window, its mean over what moves and a Gauss-Markov
+    filter.
 
     Parameters
     ----------
     frame, bbox, center, camera
         As for `GradientTracker`; `camera` matters only until the target moves.
     method : "local" or "paper"
-        With the repairs that the loop needs (default), or the text to the letter, which loses targets on all but flat backgrounds.
+        With the repairs that the loop needs (default), or the text to the letter, which loses targets on all
+        but flat backgrounds.
     search_window : int, px
-        Side of the searched window, made odd; default 51, or 1.6 times the longer side of the box where that is more.
+        Side of the searched window, made odd; default 51, or 1.6 times the longer side of the box where that
+        is more.
     control : "integer" or "subpixel"
         Whether that window moves in whole pixels (default) or not.
     order : int
@@ -57,7 +61,8 @@ class ReferenceTracker(GradientTracker):
     window : int, px
         Side of the windows of local flow, 3, 5 or 7 ("local": 7, "paper": 5).
     min_speed : float or "auto", px/frame
-        Slowest flow that counts as motion; default 0.5; "auto": three standard deviations of the flow outside the target, at least 0.3.
+        Slowest flow that counts as motion; default 0.5; "auto": three standard deviations of the flow outside
+        the target, at least 0.3.
 
     Raises
     ------
@@ -113,7 +118,8 @@ def track(frames: Iterable[ArrayLike], bbox: ArrayLike | None = None, **options:
 
 
 def derivative_kernels(order: int) -> tuple[Array, Array, Array]:
-    """Beaudet's masks (value, along x, along y), three arrays (5, 5) [row, column] = [y, x]: value and slopes (1/px) at the middle of a least-squares polynomial of total degree `order`, 1 to 4."""
+    """Beaudet's masks (value, along x, along y), three arrays (5, 5) [row, column] = [y, x]: value and slopes
+    (1/px) at the middle of a least-squares polynomial of total degree `order`, 1 to 4."""
     value, along_x, along_y = _compiled("_derivative_kernels")(_whole("order", order))
     return value, along_x, along_y
 
@@ -131,9 +137,11 @@ class PixelFlow(Brief):
 def local_flow(
     first: ArrayLike, second: ArrayLike, *, window: int = 7, order: int = 4, cond_max: float = 10.0, min_sigma: float = 2.5, step_max: float = 4.0
 ) -> PixelFlow:
-    """Flow of single pixels from a frame (H, W) to the next, one step from rest: M. Chiba and S. Ozawa, equations (1) to (8).
+    """Flow of single pixels from a frame (H, W) to the next, one step from rest: M. Chiba and S. Ozawa,
+    equations (1) to (8).
 
-    `.flow` (H, W, 2) is in px/frame, `.valid` (H, W) is where it is accepted: condition number of the gradients in the window (side `window` px) up to `cond_max`, weakest gradient at least `min_sigma` grey
+    `.flow` (H, W, 2) is in px/frame, `.valid` (H, W) is where it is accepted: condition number of the
+    gradients in the window (side `window` px) up to `cond_max`, weakest gradient at least `min_sigma` grey
     levels/px (and 0.7 times the frames' noise, unless it is 0), step up to `step_max` px.
     """
     sizes = _whole("window", window), _whole("order", order)
@@ -154,9 +162,11 @@ class MeanFlow(Brief):
 
 
 def mean_flow(flow: PixelFlow, min_speed: float = 0.5) -> MeanFlow:
-    """Mean over the valid pixels of a field (H, W) whose flow along x or along y is at least `min_speed` px/frame: one set for both axes (11).
+    """Mean over the valid pixels of a field (H, W) whose flow along x or along y is at least `min_speed`
+    px/frame: one set for both axes (11).
 
-    Raises `TypeError` for another object, `ValueError` for a negative `min_speed` and for arrays of another shape.
+    Raises `TypeError` for another object, `ValueError` for a negative `min_speed` and for arrays of another
+    shape.
     """
     if not isinstance(flow, PixelFlow):
         raise TypeError(f"flow: expected a PixelFlow, got {type(flow).__name__}")

@@ -34,6 +34,7 @@ class Status(IntEnum):
     INCONSISTENT = 8
     """A full estimate that the frames contradict: along it brightness changes by far more than usual. What is
     seen is hidden in another frame (occlusion), has
-    changed, or moves differently; the covariance does not know, and the pixel is not `valid`. Only "coarse_to_fine" reports it."""
+    changed, or moves differently; the covariance does not know, and the pixel is not `valid`. Only
+    "coarse_to_fine" reports it."""
     MISSING_FRAME = 9
     """The sequence has no frame before or after this one that the estimate needs."""

@@ -134,15 +134,16 @@ class GradientTracker:
     """Follows one target by the gradient equation.
 
     Source: M. Chiba and S. Ozawa, "A Tracking Algorithm for a Video Target Using Gradient-Based Method"
-    (IPSJ). It is deterministic and keeps bounded memory; several targets are several trackers. It pickles, also in
-    mid-stream, with what it has learnt of the scene: several planes as large as the frame.
+    (IPSJ). It is deterministic and keeps bounded memory; several targets are several trackers. It pickles,
+    also in mid-stream, with what it has learned of the scene: several planes as large as the frame.
 
     Parameters
     ----------
     frame : array (H, W) of uint8, uint16, float32 or float64
         The first frame, at least 16 x 16 px. It may be masked (numpy.ma), as all frames. Brightness is taken
-        on the scale 0 to 255: uint16 is divided by 257 (samples of 10 to 14 bits must be shifted up first), floats are taken for shares of white unless
-        at least half of what is not dark (above 0.1) exceeds 1.5, in this frame or a later one.
+        on the scale 0 to 255: uint16 is divided by 257 (samples of 10 to 14 bits must be shifted up first),
+        floats are taken for shares of white unless at least half of what is not dark (above 0.1) exceeds 1.5,
+        in this frame or a later one.
     bbox : (x, y, width, height), px
         The target's box in it, with x = centre - width / 2; sides of at least 3 px and at most twice the
         frame's; it may reach over the border.
@@ -158,8 +159,9 @@ class GradientTracker:
     Raises
     ------
     ValueError
-        For a first frame that is too small, not two-dimensional or mostly not finite, a box that is too small,
-        wholly outside or more than half masked, and options out of range; each message names the argument.
+        For a first frame that is too small, not two-dimensional or mostly not finite, a box that is too
+        small, wholly outside or more than half masked, and options out of range; each message names the
+        argument.
     TypeError
         For another dtype.
     """
@@ -178,11 +180,11 @@ class GradientTracker:
 
     def update(self, frame: ArrayLike) -> TrackResult:
         """The target in the next frame, an array (H, W) as large as the first. Where samples are masked, NaN,
-        infinite or beyond 1e9 grey levels the target is hidden; a frame with more than half of these counts as
-        one in which it was not seen.
+        infinite or beyond 1e9 grey levels the target is hidden; a frame with more than half of these counts
+        as one in which it was not seen.
 
         So does a frame whose still scene has nothing to do with that of the frame before (far too bright, or
-        noise): nothing is learnt from it. After ten in a row the scene is taken as it is. A constant of more
+        noise): nothing is learned from it. After ten in a row the scene is taken as it is. A constant of more
         than 64 grey levels that is added to a whole frame is taken off.
 
         Raises

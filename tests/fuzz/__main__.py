@@ -1,8 +1,8 @@
 """Hostile files and arguments for every reader and every public function: `python tests/fuzz --cases 10000`.
 
-Deterministic by its seed: `--seed S --case K` repeats one case. It fails on a panic or another unexpected exception, an
-abort, a call that does not end (nor on Ctrl-C), an OverflowError that does not name its argument, and files that are
-left half written.
+Deterministic by its seed: `--seed S --case K` repeats one case. It fails on a panic or another unexpected
+exception, an abort, a call that does not end (nor on Ctrl-C), an OverflowError that does not name its
+argument, and files that are left half written.
 """
 
 import argparse

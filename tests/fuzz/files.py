@@ -121,7 +121,8 @@ class Samples:
         if name == "disparity.png":
             readers[".png"] = [lambda: io.read_disparity(path)]
         found = readers.get(kind, [each_frame, lambda: io.read_image(path, colour="luminance")])
-        # The program knows none of these formats and starts ffmpeg, which takes longer than every other reader.
+        # The program knows none of these formats and starts ffmpeg, which takes longer than every other
+        # reader.
         if kind in (".json", ".pickle", ".csv") and rng.random() > FOREIGN:
             return found
         return [*found, lambda: information(path)]

@@ -2,7 +2,8 @@
 
     python tests/golden/filters.py
 
-The system is fixed here and in tests/filter/kalman.rs: state (x, y, speed, heading), range and bearing measured from the origin; every number is a plain formula.
+The system is fixed here and in tests/filter/kalman.rs: state (x, y, speed, heading), range and bearing
+measured from the origin; every number is a plain formula.
 """
 
 import math

@@ -1,4 +1,5 @@
-"""Writes flow_filter.json: the reference experiment run by filterpy (benchmarks/rivals/flow_filter.py), means at some frames.
+"""Writes flow_filter.json: the reference experiment run by filterpy (benchmarks/rivals/flow_filter.py), means
+at some frames.
 
     python tests/golden/flow_filter.py
 """

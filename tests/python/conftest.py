@@ -15,7 +15,8 @@ METHODS = ["windowed", "coarse_to_fine", "instantaneous", "lucas_kanade", "horn_
 
 
 def moving_texture(count=3, motion=(0.3, -0.2, 0.01, 0.02, -0.02, 0.01), width=48, height=40, seed=3):
-    """Smooth texture moving by the affine `motion` (u, v, u_x, v_x, u_y, v_y): float64 frames (count, H, W) in grey levels."""
+    """Smooth texture moving by the affine `motion` (u, v, u_x, v_x, u_y, v_y): float64 frames (count, H, W)
+    in grey levels."""
     names = ("u", "v", "u_x", "v_x", "u_y", "v_y")
     return scenes.Scene("affine", width=width, height=height, random_state=seed, **dict(zip(names, motion, strict=True))).frames(count)
 

@@ -16,7 +16,8 @@ def digest(*arrays):
 
 @functools.cache
 def sequence(count=3):
-    """Frames so large that their work is split between threads. A forked child has those of its parent: drawing them takes longer than most of what is done with them."""
+    """Frames so large that their work is split between threads. A forked child has those of its parent:
+    drawing them takes longer than most of what is done with them."""
     return scenes.Scene("affine", width=320, height=240, random_state=4).frames(count)
 
 

@@ -1,4 +1,5 @@
-"""Options written side by side, sorted into the groups that `estimate`, `FlowEstimator` and `FlowFilter` take."""
+"""Options written side by side, sorted into the groups that `estimate`, `FlowEstimator` and `FlowFilter`
+take."""
 
 from dataclasses import fields
 
@@ -8,7 +9,8 @@ METHODS = {m.method: m for m in (jacoflow.CoarseToFine, jacoflow.Windowed, jacof
 
 
 def grouped(**options):
-    """The same options as keywords of these functions: `window_sigma=3` becomes `method=Windowed(window_sigma=3)` and so on."""
+    """The same options as keywords of these functions: `window_sigma=3` becomes
+    `method=Windowed(window_sigma=3)` and so on."""
     groups = {"grid": jacoflow.SamplingGrid, "preprocess": jacoflow.Preprocess, "temporal": jacoflow.Recursive, "profile": jacoflow.FilterProfile}
     if "profile" not in options and not {"form", "transition", "Q", "R", "x0", "P0", "alpha", "full_scale", "square_root"} & options.keys():
         del groups["profile"]

@@ -15,7 +15,8 @@ FARNEBACK = {
     controlled.Case(256.0, 1.0, 3.0): (0.0311, 0.00534),
     controlled.Case(256.0, 4.0, 0.0): (0.0708, 0.0138),
 }
-"""Mean end-point error (px) and error of the Jacobian (1/frame) of OpenCV's Farneback with its defaults and `numpy.gradient`, as `benchmarks/tables/controlled.py` prints them."""
+"""Mean end-point error (px) and error of the Jacobian (1/frame) of OpenCV's Farneback with its defaults and
+`numpy.gradient`, as `benchmarks/tables/controlled.py` prints them."""
 
 
 def contestant(name):
@@ -31,7 +32,8 @@ def test_three_frames_are_four_times_as_accurate(case):
 
 @pytest.mark.parametrize("name", ["coarse to fine, balanced, pair", "coarse to fine, balanced"])
 def test_slopes_are_near_the_noise_bound_of_the_windows_they_rest_on(name):
-    """Least squares with exact gradients and nothing but noise would have the bound; what is asked of the mean is 1.7 times it."""
+    """Least squares with exact gradients and nothing but noise would have the bound; what is asked of the
+    mean is 1.7 times it."""
     ours = contestant(name)
     cases = [controlled.Case(64.0, 4.0, 3.0), controlled.Case(256.0, 2.0, 3.0)]
     # Three frames are farther from the bound.
@@ -55,7 +57,8 @@ def test_windows_follow_the_flow(tmp_path):
 
 
 def test_two_frames_are_limited_by_noise():
-    """Where pairs are not four times as accurate as Farneback's flow, least squares in the best window is not either."""
+    """Where pairs are not four times as accurate as Farneback's flow, least squares in the best window is not
+    either."""
     case = controlled.Case(256.0, 1.0, 3.0)
     ours = contestant("coarse to fine, balanced, pair")
     efficient = ours.efficient(case)
@@ -63,8 +66,8 @@ def test_two_frames_are_limited_by_noise():
 
 
 def test_smooth_curvature_is_not_taken_for_a_step():
-    """Waves of 2 px over 40 px: a site's own window holds curved flow. Taken for what smoothness holds back, it leaves
-    .010 px on these seeds, .007 without."""
+    """Waves of 2 px over 40 px: a site's own window holds curved flow. Taken for what smoothness holds back,
+    it leaves .010 px on these seeds, .007 without."""
     squares = []
     for seed in (11, 12):
         scene = jacoflow.scenes.Scene("waves", width=160, height=144, carrier="noise", random_state=seed, speed=2.0, wavelength=40.0)

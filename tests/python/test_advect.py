@@ -49,7 +49,8 @@ def test_a_site_moves_by_its_own_flow(estimated):
 
 
 def test_between_sites_of_a_coarse_grid_the_jacobian_counts():
-    """A field on every fourth pixel is as exact for affine motion as a dense one; the bilinear mean of a curved one is not."""
+    """A field on every fourth pixel is as exact for affine motion as a dense one; the bilinear mean of a
+    curved one is not."""
     frames = list(scene(random_state=4).frames(3))
     coarse = jacoflow.flow(*frames, method="windowed", grid=jacoflow.SamplingGrid(stride=4, region=(4, 4, 29, 25)))
     assert np.isfinite(coarse.advect([[5.0, 5.5], [32.0, 28.0]])).all()

@@ -6,7 +6,8 @@ import pytest
 import jacoflow
 from benchmarks.scenes.disturbed import layered
 
-# Mean error, px, of what both frames show within 10 px of the boundary: .56 to .60 without the refinement of pixels.
+# Mean error, px, of what both frames show within 10 px of the boundary: .56 to .60 without the refinement of
+# pixels.
 BARS = {"balanced": 0.5, "accurate": 0.49}
 
 

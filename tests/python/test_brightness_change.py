@@ -39,8 +39,8 @@ def test_flicker_does_not_disturb_three_frames():
 
 
 def test_noise_that_is_given_grows_with_the_gain_that_is_removed():
-    """The second of two frames is divided by .5, with its noise: variance (1 + 4) / 2 for 1. The noise is so low
-    that standard deviations are proportional to it, and above the other errors."""
+    """The second of two frames is divided by .5, with its noise: variance (1 + 4) / 2 for 1. The noise is so
+    low that standard deviations are proportional to it, and above the other errors."""
     picture = 110 + 22 * scenes.texture(16)
     views = [scenes.view(picture, (0, 0)), scenes.view(picture, (0.4, 0.2))]
     equal = jacoflow.flow(*[scenes.noisy(frame, n) for n, frame in enumerate(views)], noise=1.0)

@@ -1,4 +1,5 @@
-"""What `estimate` says by default, against exact truth: its errors lie within its deviations, and are smaller than the baselines'."""
+"""What `estimate` says by default, against exact truth: its errors lie within its deviations, and are smaller
+than the baselines'."""
 
 import itertools
 from functools import cache
@@ -15,7 +16,8 @@ MARGIN = 20
 CASES = [("affine", "noise"), ("affine", "speckle"), ("affine", "particles"), ("vortex", "noise"), ("vortex", "particles"), ("plane", None)]
 
 
-# Motions that bend take long to follow: what is drawn is kept for other noise and other methods, and the truth for other textures, which move alike.
+# Motions that bend take long to follow: what is drawn is kept for other noise and other methods, and the
+# truth for other textures, which move alike.
 
 
 def scene_of(name, carrier, seed, parameters, size):
@@ -48,7 +50,8 @@ def flow_error(field, truth, known):
     return np.sqrt(np.mean(np.sum((field.flow - truth.flow)[known] ** 2, axis=-1)))
 
 
-# Errors of the second go together over some 20 px: a frame of this size holds only a few independent ones, so that it takes more frames.
+# Errors of the second go together over some 20 px: a frame of this size holds only a few independent ones, so
+# that it takes more frames.
 @pytest.mark.parametrize(("method", "seeds", "share"), [("windowed", 1, 0.88), ("coarse_to_fine", 8, 0.9)])
 @pytest.mark.parametrize("noise", [0.0, 2.0])
 @pytest.mark.parametrize(("name", "carrier"), CASES)
@@ -96,8 +99,10 @@ MOTIONS = {
 @pytest.mark.parametrize("frames", [2, 3])
 @pytest.mark.parametrize("carrier", ["noise", "speckle", "particles"])
 def test_intervals_of_the_coarse_to_fine_estimate_hold_the_truth(carrier, frames):
-    """95 % intervals over three motions and two noise levels together: .92 to .97 is asked. One texture has few independent errors, since windows reach over
-    20 px, and those of pairs and of affine motion are told on the wide side (benchmarks/tables/coverage.py), most of all noise textures in three frames (.99): .90 to .995 is allowed here.
+    """95 % intervals over three motions and two noise levels together: .92 to .97 is asked. One texture has
+    few independent errors, since windows reach over 20 px, and those of pairs and of affine motion are told
+    on the wide side (benchmarks/tables/coverage.py), most of all noise textures in three frames (.99): .90 to
+    .995 is allowed here.
     """
     held = {name: [] for name in ("u", "v", "divergence", "curl")}
     for (motion, parameters), noise, seed in ((m, n, s) for m in MOTIONS.items() for n, s in ((1.0, 1), (3.0, 2))):
@@ -114,15 +119,16 @@ def test_intervals_of_the_coarse_to_fine_estimate_hold_the_truth(carrier, frames
 
 
 def test_intervals_of_a_small_disc_hold_its_motion():
-    """Smoothness holds back a disc of 20 px that turns by .02 rad: by half of its motion without the step beyond
-    chance, and half of the intervals of u missed that."""
+    """Smoothness holds back a disc of 20 px that turns by .02 rad: by half of its motion without the step
+    beyond chance, and half of the intervals of u missed that."""
     missed, relative = np.mean([disc(seed, 0.02) for seed in range(61, 65)], axis=0)
     assert missed < 0.05 and relative < 0.35
 
 
 @pytest.mark.parametrize("frames", [2, 3])
 def test_what_leaves_the_frame_has_wide_intervals(frames):
-    """Beside an edge that motion of 6 px crosses nothing is seen; a field that is continued from inside is told to be so."""
+    """Beside an edge that motion of 6 px crosses nothing is seen; a field that is continued from inside is
+    told to be so."""
     shares, wider = [], []
     shear = {"u": 6.0, "v": 0.5, "u_x": 0.0, "v_x": 0.0, "u_y": 0.02, "v_y": 0.0}
     motions = (("affine", shear), ("waves", {"speed": 6.0, "wavelength": 128.0}))
@@ -174,7 +180,8 @@ def test_the_covariance_is_positive_definite_and_grows_with_noise_and_without_te
 
 
 def flat_area(kind, width, centre):
-    """Signed distance, px, from the edge of a flat square or stripe, or of the flat half of a frame: negative where it is flat."""
+    """Signed distance, px, from the edge of a flat square or stripe, or of the flat half of a frame: negative
+    where it is flat."""
     y, x = np.indices((256, 256)).astype(float)
     return {"square": np.maximum(abs(x - centre), abs(y - centre)) - width / 2, "stripe": abs(x - centre) - width / 2, "half": x - centre}[kind]
 
@@ -194,7 +201,8 @@ def flat_area(kind, width, centre):
 )
 def test_what_coarse_levels_leave_beneath_areas_without_texture_is_reported(preset, kind, width, textures, least):
     """In a scene that moves as a whole nothing bends, but only coarse levels see into flat areas. Where the
-    area lies on the grid that deviations are told at must not matter. They may be wide, but not so wide that nothing is told."""
+    area lies on the grid that deviations are told at must not matter. They may be wide, but not so wide that
+    nothing is told."""
     y, x = np.indices((256, 256)).astype(float)
     inside, rim, wide = [], [], []
     for at, centre in enumerate((128, 132, 136, 140)):
@@ -222,7 +230,8 @@ def test_what_coarse_levels_leave_beneath_areas_without_texture_is_reported(pres
 @pytest.mark.parametrize("preset", ["fast", "balanced"])
 @pytest.mark.parametrize("frames", [2, 3])
 def test_texture_of_one_direction_shows_motion_across_it_and_not_along_it(preset, frames):
-    """A square of 80 px has upright stripes, the rest of the scene has texture of all directions; all of it moves as a whole."""
+    """A square of 80 px has upright stripes, the rest of the scene has texture of all directions; all of it
+    moves as a whole."""
     y, x = np.indices((240, 320)).astype(float)
     area = np.s_[90:150, 130:190]
     across, along = [], []
@@ -247,8 +256,10 @@ def test_texture_of_one_direction_shows_motion_across_it_and_not_along_it(preset
 
 @pytest.mark.parametrize(("preset", "least"), [("fast", 0.85), ("balanced", 0.85)])
 def test_areas_without_texture_are_reported_as_uncertain_as_they_are(preset, least):
-    """Beneath a flat patch of 50 px flow bends: it is continued from the textured sites around, and the intervals say how far motion departs from that. Without this they hold the truth
-    in an eighth to three fifths of the patch. A bend that nothing shows outside the patch cannot be known: fewer than 95 of 100 intervals are asked to hold."""
+    """Beneath a flat patch of 50 px flow bends: it is continued from the textured sites around, and the
+    intervals say how far motion departs from that. Without this they hold the truth in an eighth to three
+    fifths of the patch. A bend that nothing shows outside the patch cannot be known: fewer than 95 of 100
+    intervals are asked to hold."""
     y, x = np.indices((200, 200)).astype(float)
 
     def along(x):

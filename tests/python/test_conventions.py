@@ -31,7 +31,8 @@ def test_each_derivative_shows_in_its_own_place(method, parameter):
     names = ("u", "v", "u_x", "v_x", "u_y", "v_y")
     motion = [0.02 if name == parameter else 0.0 for name in names]
     if method == "instantaneous":
-        # A quadratic picture is what the per-pixel method is exact on; its second differences are tiny, hence float64.
+        # A quadratic picture is what the per-pixel method is exact on; its second differences are tiny, hence
+        # float64.
         scene_motion = np.array(motion)
         y, x = np.mgrid[0:21, 0:21] - 10.0
         jacobian = np.array([[scene_motion[2], scene_motion[4]], [scene_motion[3], scene_motion[5]]])
@@ -77,7 +78,8 @@ def test_sample_types_of_the_same_picture_give_the_same_flow(method, texture):
     for name, field in fields.items():
         scale = np.nanmedian(np.abs(reference.flow))
         if method == "instantaneous":
-            # Ill-conditioned pixels amplify the rounding of float32: compare where the equations are well determined.
+            # Ill-conditioned pixels amplify the rounding of float32: compare where the equations are well
+            # determined.
             difference = np.abs(field.flow - reference.flow)[field.valid & reference.valid]
             assert np.median(difference) < 1e-3 * scale, name
             continue
@@ -249,7 +251,8 @@ def test_a_field_is_true_and_a_stack_can_be_sliced():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_pixel_without_data_damages_only_what_touches_it(method):
-    """No-data values of 1e9 and more are usual; a threshold taken from the whole frame would hide everything else."""
+    """No-data values of 1e9 and more are usual; a threshold taken from the whole frame would hide everything
+    else."""
     frames = moving_texture(width=96, height=96).astype(np.float32)
     clean = jacoflow.flow(*frames, method=method)
     frames[1, 50, 50] = 3e9
@@ -306,7 +309,8 @@ def test_neither_axis_comes_first(options):
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_covariances_are_positive_definite_where_little_is_known(noise):
-    """A grating leaves the motion along its lines open: the matrices are nearly singular, in single precision."""
+    """A grating leaves the motion along its lines open: the matrices are nearly singular, in single
+    precision."""
     y, x = np.mgrid[:64, :72]
     camera = scenes.Sensor(noise=noise, rounding="nearest", saturate=True, random_state=2)
     gratings = [100 + 50 * np.sin((x + 0.7 * y - 0.3 * t) / 4) for t in (-1, 0, 1)]

@@ -99,7 +99,8 @@ def test_rotation_centre():
 
 @pytest.mark.parametrize(("count", "smooth", "least"), [(3, None, 0.5), (3, 1.5, 0.1), (2, None, 0.5)])
 def test_the_deviation_of_a_regions_mean_holds_its_error(count, smooth, least):
-    """Neighbouring estimates share pixels: 1,600 of them are not 1,600 independent ones. Of smoothed frames deviations are told on the wide side."""
+    """Neighbouring estimates share pixels: 1,600 of them are not 1,600 independent ones. Of smoothed frames
+    deviations are told on the wide side."""
     motion = dict(u=0.1, v=0.05, u_x=0.003, v_x=0.006, u_y=-0.006, v_y=0.003)
     ratios = []
     for texture in range(4):
@@ -120,7 +121,8 @@ def test_the_deviation_of_a_regions_mean_holds_its_error(count, smooth, least):
 
 @pytest.mark.parametrize("name", ["affine", "plane"])
 def test_the_deviation_of_a_regions_mean_holds_the_bias_of_clean_frames(name):
-    """Without noise all estimates are biased alike; averaging does not help, and the deviation may not pretend so."""
+    """Without noise all estimates are biased alike; averaging does not help, and the deviation may not
+    pretend so."""
     ratios = []
     for seed in range(4):
         scene = scenes.Scene(name, width=96, height=96, random_state=seed)

@@ -1,4 +1,5 @@
-"""A process that was forked, or begun in another way, computes as its parent does: nothing waits for threads or locks that stayed behind."""
+"""A process that was forked, or begun in another way, computes as its parent does: nothing waits for threads
+or locks that stayed behind."""
 
 import concurrent.futures
 import functools
@@ -253,7 +254,8 @@ CALLS = {
     "flow filter": filtered,
     "reference tracker": lambda: [jacoflow.reference.local_flow(*sequence(2)).flow],
 }
-"""What computes, with so much to do that threads share it: none may use threads that a child cannot have anew."""
+"""What computes, with so much to do that threads share it: none may use threads that a child cannot have
+anew."""
 
 
 @needs_fork

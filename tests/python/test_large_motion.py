@@ -1,4 +1,5 @@
-"""Motions of many pixels: how far the pyramid reaches, and that a preset which costs more does not reach less far."""
+"""Motions of many pixels: how far the pyramid reaches, and that a preset which costs more does not reach less
+far."""
 
 import numpy as np
 import pytest
@@ -11,8 +12,8 @@ MARGIN = 180
 
 
 def moved(angle, shift, seed):
-    """Three frames of a texture that turns by `angle` degrees about the middle and moves by `shift` px along x from frame to frame, the flow (H, W, 2) from the middle one, and
-    where all three show the same."""
+    """Three frames of a texture that turns by `angle` degrees about the middle and moves by `shift` px along
+    x from frame to frame, the flow (H, W, 2) from the middle one, and where all three show the same."""
     rng = np.random.default_rng(seed)
     smooth = gaussian_filter(rng.standard_normal([side + 2 * MARGIN for side in SIZE]), 2)
     texture = 128 + 40 * smooth / smooth.std()
@@ -53,7 +54,8 @@ def test_a_fast_turn_and_a_long_way_are_followed_everywhere(angle, shift, frames
 
 
 def test_accurate_reaches_as_far_as_balanced():
-    """Two frames that turn by 20 degrees are at the edge of what is found: not every texture is followed by either."""
+    """Two frames that turn by 20 degrees are at the edge of what is found: not every texture is followed by
+    either."""
     scenes = [moved(20, 0, seed) for seed in range(8)]
     found = {
         preset: sum(error(pictures[1:], truth, inside, preset) < 0.2 for pictures, truth, inside in scenes)

@@ -19,7 +19,8 @@ def texture(random_state):
 
 
 def scene(count, step=1.5):
-    """A square of a texture of its own before a textured wall: frames (T, H, W) of floats, 0 to 255, centres."""
+    """A square of a texture of its own before a textured wall: frames (T, H, W) of floats, 0 to 255,
+    centres."""
     wall, own = texture(0)[20 : 20 + HEIGHT, 40 : 40 + WIDTH], texture(1)
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
     frames, centres = [], []

@@ -1,4 +1,5 @@
-"""Beside a mask the flow is nearly as good as beside the frame's edge: what the mask hides does not hold it back."""
+"""Beside a mask the flow is nearly as good as beside the frame's edge: what the mask hides does not hold it
+back."""
 
 import numpy as np
 import pytest

@@ -56,7 +56,8 @@ def test_agrees_with_scikit_learn_on_repeated_points(d, rounds):
         reference.fit(repeated)
     ours = VariationalGaussianMixture(6, covariance_prior=0.1, tol=None, max_iter=rounds).fit(x, sample_weight=f, resp=resp)
     assert ours.n_iter_ == rounds
-    # On its way a fit of three dimensions doubles rounding each round for a while; what is 0 or nearly so is compared with the size of the others.
+    # On its way a fit of three dimensions doubles rounding each round for a while; what is 0 or nearly so is
+    # compared with the size of the others.
     midway = (d, rounds) == (3, 10)
     relative, shares = (1e-11, 1e-11) if midway else (6e-13, 2e-12)
     for name in ("weight_concentration_", "mean_precision_", "degrees_of_freedom_", "weights_", "covariances_"):
@@ -80,7 +81,8 @@ def test_weights_are_repetitions_and_seeds_do_not_know_the_order(d):
 
 @pytest.mark.parametrize("d", [1, 2, 3, 7])
 def test_one_component_has_the_exact_posterior_and_evidence(d):
-    """Of one Gaussian with a conjugate prior all is known: the evidence is the product of what is predicted of each point from those before it, which are Student's t."""
+    """Of one Gaussian with a conjugate prior all is known: the evidence is the product of what is predicted
+    of each point from those before it, which are Student's t."""
     rng = np.random.default_rng(d)
     x = rng.normal(size=(30, d)) @ rng.normal(size=(d, d)) + 3
     beta, nu, mean, scatter = 0.5, d + 2.0, np.full(d, 0.2), 0.7 * np.eye(d)
@@ -154,7 +156,8 @@ def test_batches_and_a_single_fit():
 @pytest.mark.parametrize("forgetting", [1.0, 0.6, 0.1])
 @pytest.mark.parametrize("components", [1, 3])
 def test_forgetting_is_a_fit_with_weights_by_age(components, forgetting):
-    """Where responsibilities are beyond doubt, batches leave what one fit does whose weights are `forgetting` to the power of their age."""
+    """Where responsibilities are beyond doubt, batches leave what one fit does whose weights are `forgetting`
+    to the power of their age."""
     rng = np.random.default_rng(0)
     centres = np.array([[0.0, 0.0, 0.0], [60.0, 0.0, 0.0], [0.0, 80.0, 30.0]])[:components]
     batches = [centres[rng.integers(components, size=200)] + rng.normal(size=(200, 3)) for _ in range(6)]

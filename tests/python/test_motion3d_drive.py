@@ -27,7 +27,8 @@ def test_errors_of_a_grid_are_correlated_at_their_distance():
 
 @pytest.mark.skipif(not (DATA / "kitti_odometry").is_dir(), reason="no recordings")
 def test_the_reference_was_interpolated_where_it_is_not_used():
-    """The camera shook all the while: in the pairs that were measured our rotations change as the reference's do, before by as much, and the reference's by nothing."""
+    """The camera shook all the while: in the pairs that were measured our rotations change as the reference's
+    do, before by as much, and the reference's by nothing."""
     rows = driving.poses(DATA, "fast")
     turned, ours = (np.array([row[name] for row in rows]) for name in ("reference turns otherwise than in the pair before, deg", "ours, deg"))
     measured = np.array([row["reference"] == "measured" for row in rows])

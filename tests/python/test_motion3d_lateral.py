@@ -24,7 +24,8 @@ def test_published_figures():
 
 
 def test_variances_of_many_trials_are_those_of_theory():
-    """Within 6 %: the mean of 3000 squares scatters by 2.6 %. At 50 points and a noise of 1 the first order is no longer enough."""
+    """Within 6 %: the mean of 3000 squares scatters by 2.6 %. At 50 points and a noise of 1 the first order
+    is no longer enough."""
     rows = scores.one_unknown(3000)
     assert [row["n"] for row in rows] == [1000] * 4 + [50]
     for row in rows:
@@ -61,7 +62,8 @@ def test_estimates_are_what_they_say(weights):
 
 
 def test_it_agrees_with_the_general_estimate():
-    """The same scene for `estimate_motion`, whose rotation is told to be none: it has one more unknown, which tells nothing of the angle."""
+    """The same scene for `estimate_motion`, whose rotation is told to be none: it has one more unknown, which
+    tells nothing of the angle."""
     rng = np.random.default_rng(4)
     nu, seen = flow(400, 0.6, 0.02)
     rng.shuffle(seen)

@@ -1,4 +1,5 @@
-"""Layouts, shapes of noise, planes and long displacements: what says `ok` is right, and as far off as it says."""
+"""Layouts, shapes of noise, planes and long displacements: what says `ok` is right, and as far off as it
+says."""
 
 import pytest
 
@@ -12,13 +13,15 @@ OTHERS = {
     "two views, plane, noise 0.05 of the displacement": 100,
     "a plane, axes of the noise 100 to 1": 200,
 }
-"""Fewer trials of rows that are farther from their bounds than the others, or cost more; more of one that is seldom `ok`."""
+"""Fewer trials of rows that are farther from their bounds than the others, or cost more; more of one that is
+seldom `ok`."""
 LESS = (
     *("all over the picture", "a corner", "two clusters"),
     *("noise 5 to 1", " 1 to 1", "10 to 1", "20 to 1", "30 to 1", "50 to 1"),
     *("waves, noise 0.03 of the displacement", "waves, noise 0.1 of the displacement", "cloud, noise 0.1 of the displacement", "plane, noise 0.01 of the displacement"),
 )
-"""Ends of the names of rows left out: shorter axes of the noise, less of it, layouts and depths that are like others. A moving object in even noise is in `test_motion3d_points`."""
+"""Ends of the names of rows left out: shorter axes of the noise, less of it, layouts and depths that are like
+others. A moving object in even noise is in `test_motion3d_points`."""
 ROWS = {part: [name for name in layouts.cases([part]) if not name.endswith(LESS)] for part in ("layouts", "noise", "objects", "planes", "views")}
 
 

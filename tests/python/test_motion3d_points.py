@@ -184,7 +184,8 @@ HARD = {
     "6 patches with Jacobians": (140, 0.3),
     "30 patches with Jacobians": (100, 0.3),
 }
-"""Rows of the benchmark, numbers of scenes, and the share that is `ok` at least. Ten patches are estimated as six are."""
+"""Rows of the benchmark, numbers of scenes, and the share that is `ok` at least. Ten patches are estimated as
+six are."""
 
 
 @pytest.mark.parametrize("name", HARD)
@@ -196,7 +197,8 @@ def test_covariances_hold_where_they_are_hard_to_state(name):
 
 
 def test_what_is_said_of_scenes_by_chance_holds():
-    """No published scene among them. The bounds are two deviations from 95 %: of 600 scenes, and of the 150 to 200 of a class."""
+    """No published scene among them. The bounds are two deviations from 95 %: of 600 scenes, and of the 150
+    to 200 of a class."""
     rows = {row["scenes"]: row for row in honesty.table(600)}
     assert rows["all"]["ok"] > 500 and rows["all"]["wrong"] <= 1
     assert 0.93 < rows["all"]["holds"] < 0.97, rows["all"]

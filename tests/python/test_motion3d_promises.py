@@ -1,4 +1,5 @@
-"""Promises of the interface of 3-D motion: which method runs when, what a sideways motion has no answer to, and that Python goes on meanwhile."""
+"""Promises of the interface of 3-D motion: which method runs when, what a sideways motion has no answer to,
+and that Python goes on meanwhile."""
 
 import threading
 
@@ -44,7 +45,8 @@ def test_a_motion_along_the_picture_never_arrives():
 
 
 def test_python_goes_on_while_a_motion_is_estimated():
-    """A thread that sleeps a thousandth of a second between counts goes on counting during a large estimate: with the interpreter locked it would wake once or twice, before and after."""
+    """A thread that sleeps a thousandth of a second between counts goes on counting during a large estimate:
+    with the interpreter locked it would wake once or twice, before and after."""
     make = scenes.differential("smooth", "oblique", 200_000, 0.1, 1)
     counts, done, begun = [0], threading.Event(), threading.Event()
 

@@ -45,7 +45,8 @@ def test_a_drive_is_better_than_five_points_on_tracks():
 @pytest.mark.usefixtures("remembered")
 @pytest.mark.skipif(not (DATA / "kitti_odometry").is_dir(), reason="no recordings")
 def test_halves_of_the_picture_differ_by_what_their_covariances_say():
-    """Ten pairs and four ways to halve: of 9 that are right, two outside of 95 % ellipsoids by chance are rarer than one in ten."""
+    """Ten pairs and four ways to halve: of 9 that are right, two outside of 95 % ellipsoids by chance are
+    rarer than one in ten."""
     rows = recordings.spacings(DATA, spacings=(16,), every=2, independent=("left and right",))
     for row in rows:
         assert row["ok"] >= 9 and row["share within 95 %"] >= 0.88 and row["mean"] < 1.2, row
@@ -70,7 +71,8 @@ def test_time_to_contact_agrees_with_the_laser(cars):
 
 
 def test_the_whole_scene_moves_straight_ahead_or_it_is_reported(cars):
-    """A tank lorry overtakes on a quarter of the picture: together with the other side it would fit a sideways motion."""
+    """A tank lorry overtakes on a quarter of the picture: together with the other side it would fit a
+    sideways motion."""
     for row in cars:
         straight = float(str(row["scene off straight ahead, deg"])) < 3
         assert straight or row["scene's status"] != "ok", row

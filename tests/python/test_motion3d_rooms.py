@@ -1,4 +1,5 @@
-"""The covariances of motions of flow fields of rendered rooms: benchmarks/tables/motion3d_fields.py in small."""
+"""The covariances of motions of flow fields of rendered rooms: benchmarks/tables/motion3d_fields.py in
+small."""
 
 import numpy as np
 import pytest
@@ -31,7 +32,8 @@ def seen():
 @pytest.mark.parametrize("method", fields.METHODS)
 @pytest.mark.parametrize("way", fields.WAYS)
 def test_ellipsoids_hold_as_often_as_they_say(seen, method, way):
-    """Of the few of so few rooms that are ok nearly all. Errors of patches of slow, precise flow may go together farther than is told."""
+    """Of the few of so few rooms that are ok nearly all. Errors of patches of slow, precise flow may go
+    together farther than is told."""
     row = fields.row(f"{method}, {way}", fields.estimated(seen[method], way))
     assert row["wrong"] == 0 and row["ok"] >= (ROOMS if method == "coarse_to_fine" else 1), row
     least = 0.88 if way != "patches=48" else 0.7
@@ -39,7 +41,8 @@ def test_ellipsoids_hold_as_often_as_they_say(seen, method, way):
 
 
 def test_a_scale_of_the_flow_that_no_residual_shows_is_in_the_rotation():
-    """Windowed flow beyond its range is too long by a tenth and more; the rotation's covariance has it, and nothing else."""
+    """Windowed flow beyond its range is too long by a tenth and more; the rotation's covariance has it, and
+    nothing else."""
     field, made = fields.field("windowed", 1.5, fields.STEPS["quick"], 7)
     points = np.argwhere(np.asarray(field.valid))[::97, ::-1]
     flow = np.stack([field.u, field.v], axis=-1)[points[:, 1], points[:, 0]]

@@ -35,7 +35,8 @@ def test_two_exact_patches_are_enough():
 
 @pytest.mark.parametrize("case", [1, 3])
 def test_six_numbers_on_layouts_with_the_published_bounds(case):
-    """Shrunk slants and flow alone within a fifth of the published figures; six numbers worse without shrinking where patches are small."""
+    """Shrunk slants and flow alone within a fifth of the published figures; six numbers worse without
+    shrinking where patches are small."""
     h, n, radius, noise_std, asked = six.SIX[case]
     like, _ = six.like_the_published(h, n, radius, noise_std, asked)
     row = six.six_row([scenes.patches("oblique", n, radius, noise_std, like[t % len(like)], h, t) for t in range(160)], asked)

@@ -1,4 +1,5 @@
-"""Rows of the published tables of 3-D motion: how large errors are beside what is published, predicted and reached by others. `benchmarks.tables.motion3d_published` prints all of them."""
+"""Rows of the published tables of 3-D motion: how large errors are beside what is published, predicted and
+reached by others. `benchmarks.tables.motion3d_published` prints all of them."""
 
 from functools import cache
 
@@ -13,7 +14,8 @@ from jacoflow import motion3d
 
 
 TRIALS = {0: 60, 3: 150, 7: 100}
-"""Rows of the table of scenes: points by chance, a smooth scene, the ground; and trials: errors of the smooth scene scatter most."""
+"""Rows of the table of scenes: points by chance, a smooth scene, the ground; and trials: errors of the smooth
+scene scatter most."""
 GAINS = (3, 7)
 """Those in which smoothed weights are worth a quarter of the error and more."""
 TRUSTED = {0: 0.9, 3: 0.8, 7: 0.95}
@@ -22,7 +24,10 @@ TRUSTED = {0: 0.9, 3: 0.8, 7: 0.95}
 
 @pytest.mark.parametrize("case", TRIALS)
 def test_no_scene_pays_for_smoothed_weights(case):
-    """Both columns within a fifth of the published, and smoothed weights never more than 3 % above maximum likelihood on the same noise. Where they are worth their while, 1.3 times below, and honest. Over noisy ground maximum likelihood's rotation is as published, its direction far above the bound. Where depths are informative the motion is trusted."""
+    """Both columns within a fifth of the published, and smoothed weights never more than 3 % above maximum
+    likelihood on the same noise. Where they are worth their while, 1.3 times below, and honest. Over noisy
+    ground maximum likelihood's rotation is as published, its direction far above the bound. Where depths are
+    informative the motion is trusted."""
     depth, name, n, noise_std, h, asked = scores.PRACTICAL[case]
     plain, smoothed, inside, turns, bounds, statuses, wrong = [], [], [], [], [], [], 0
     for seed in range(TRIALS[case]):
@@ -64,7 +69,8 @@ def test_true_depths_in_the_weights_reach_their_prediction(case, monkeypatch):
 # Of the rows of 5000 points in noise that breaks the bound, the one of two depths.
 @pytest.mark.parametrize("case", [0, 1, 3, 4, 5])
 def test_distances_are_those_of_theory(case, monkeypatch):
-    """Mahalanobis distances under (17) and under the bound, and the deviations themselves, within a fifth of the published."""
+    """Mahalanobis distances under (17) and under the bound, and the deviations themselves, within a fifth of
+    the published."""
     monkeypatch.setattr(scores, "THEORY", scores.THEORY[case : case + 1])
     row = scores.theory(100)[0]
     for name in ("ML rms", "(17)", "CRLB", "m(17)", "m(CRLB)"):
@@ -81,7 +87,8 @@ def trial(case, seed):
 
 
 def errors_in_pixels(case, trials):
-    """Errors of maximum likelihood and of smoothed weights, deg, and the published medians and rms of both."""
+    """Errors of maximum likelihood and of smoothed weights, deg, and the published medians and rms of
+    both."""
     trials = [trial(case, seed) for seed in range(trials)]
     plain = [scores.angle(found.ml.translation, make.u) for make, found in trials]
     smoothed = [scores.angle(found.translation, make.u) for make, found in trials]
@@ -90,12 +97,14 @@ def errors_in_pixels(case, trials):
 
 
 PIXELS = {3: 96, 6: 64, 7: 64, 10: 64}
-"""Rows of the table of two views: a smooth scene, the ground, points by chance with outliers, an object that moves by itself; and trials."""
+"""Rows of the table of two views: a smooth scene, the ground, points by chance with outliers, an object that
+moves by itself; and trials."""
 
 
 @pytest.mark.parametrize("case", PIXELS)
 def test_two_views_in_pixels_are_as_published(case):
-    """Medians and rms of both estimators no more than a fifth above those of the published 24 trials, and no less than what so few trials may differ by."""
+    """Medians and rms of both estimators no more than a fifth above those of the published 24 trials, and no
+    less than what so few trials may differ by."""
     *errors, figures = errors_in_pixels(case, PIXELS[case])
     for name, values, (median, root) in zip(("ML", "efficient"), errors, figures, strict=True):
         for what, got, asked in (("median", np.median(values), median), ("rms", scores.rms(values), root)):
@@ -105,7 +114,8 @@ def test_two_views_in_pixels_are_as_published(case):
 
 @pytest.mark.parametrize("case", PIXELS)
 def test_two_views_in_pixels_beat_opencv(case):
-    """On 24 trials never more than 5 % worse than any of OpenCV's, and three times better with 40 % outliers; right labels."""
+    """On 24 trials never more than 5 % worse than any of OpenCV's, and three times better with 40 % outliers;
+    right labels."""
     noise_std, disturbed = scores.PIXELS[case][2], scores.PIXELS[case][4]
     trials = [trial(case, seed) for seed in range(24)]
     ours = scores.rms([scores.angle(found.translation, make.u) for make, found in trials])

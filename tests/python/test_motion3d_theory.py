@@ -1,4 +1,5 @@
-"""Published values and tables: the bound, what maximum likelihood and smoothed weights reach, what the text says besides."""
+"""Published values and tables: the bound, what maximum likelihood and smoothed weights reach, what the text
+says besides."""
 
 import numpy as np
 import pytest

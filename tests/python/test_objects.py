@@ -1,4 +1,5 @@
-"""Objects with ways of their own: three frames must not tell them worse than two because they stop, start or turn back."""
+"""Objects with ways of their own: three frames must not tell them worse than two because they stop, start or
+turn back."""
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ def texture(rng):
 
 
 def square(side, before, after, *, background=(0, 0), seed=0):
-    """Three frames of a square before a background: it comes by `before` px and goes on by `after`, whole px (x, y), and all have noise of 1 grey level."""
+    """Three frames of a square before a background: it comes by `before` px and goes on by `after`, whole px
+    (x, y), and all have noise of 1 grey level."""
     rng = np.random.default_rng(seed)
     behind, thing = texture(rng), texture(rng)
     y, x = np.indices((SIZE, SIZE))
@@ -67,12 +69,14 @@ SMALL = {
     "two frames, 40 px wide, 6 px": (40, (6, 0), (6, 0), 2, 14),
     "goes on, 4 px": (30, (4, 0), (4, 0), 3, 14),
 }
-"""Their width, before and after, frames, and how many of 16 seeds at least are to be found: 2 or 3 fewer than were."""
+"""Their width, before and after, frames, and how many of 16 seeds at least are to be found: 2 or 3 fewer than
+were."""
 
 
 @pytest.mark.parametrize("way", SMALL)
 def test_most_small_objects_are_found_where_all_else_stands_still(way):
-    """They are a fiftieth to a twentyfifth of the frame: what they still have to move is nothing in the mean over the frame."""
+    """They are a fiftieth to a twentyfifth of the frame: what they still have to move is nothing in the mean
+    over the frame."""
     side, before, after, count, least = SMALL[way]
     errors = [error(square(side, before, after, seed=seed)[3 - count :], side, after) for seed in range(16)]
     found = sum(each < 0.5 for each in errors)
@@ -81,7 +85,8 @@ def test_most_small_objects_are_found_where_all_else_stands_still(way):
 
 
 def test_beside_motion_boundaries_three_frames_are_nearly_as_good_as_two():
-    """They have twice the occlusions: the mean error from 12 px within the edge to 16 px beyond it, over three motions of square and background."""
+    """They have twice the occlusions: the mean error from 12 px within the edge to 16 px beyond it, over
+    three motions of square and background."""
     y, x = np.indices((SIZE, SIZE))
     beyond = np.maximum(abs(x - SIZE // 2), abs(y - SIZE // 2)) - 30
     errors = []

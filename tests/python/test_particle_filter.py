@@ -1,4 +1,5 @@
-"""The particle filter against the Kalman filter, numpy and filterpy, and its promises on random numbers and failures."""
+"""The particle filter against the Kalman filter, numpy and filterpy, and its promises on random numbers and
+failures."""
 
 import copy
 import pickle
@@ -53,7 +54,8 @@ def assert_same(one, other):
 
 
 def corrected_residual(weights, uniforms):
-    """filterpy's residual_resample with the remainder N w - floor(N w); the package subtracts the copies from w itself."""
+    """filterpy's residual_resample with the remainder N w - floor(N w); the package subtracts the copies from
+    w itself."""
     n = len(weights)
     copies = np.floor(n * weights).astype(int)
     whole = np.repeat(np.arange(n), copies)
@@ -111,7 +113,8 @@ def test_systematic_case_and_effective_sample_size():
     ],
 )
 def test_copies_have_their_mean_and_variance(scheme, variances):
-    """The multinomial's variance is n w (1 - w), the residual's that of 2 draws from the remainders (.8, .6, .4, .2) / 2."""
+    """The multinomial's variance is n w (1 - w), the residual's that of 2 draws from the remainders (.8, .6,
+    .4, .2) / 2."""
     weights = np.array([0.1, 0.2, 0.3, 0.4])
     copies = np.array([np.bincount(resample(weights, 8, scheme, random_state=k), minlength=4) for k in range(20_000)])
     assert_allclose(copies.mean(axis=0), 8 * weights, atol=0.02)
@@ -149,7 +152,8 @@ def test_schemes_select_what_filterpy_selects(seed, count):
 
 
 def test_filterpys_residual_scheme_never_draws_some_particles():
-    """Why its drawn part is not the reference: N w = .4, .8, 1.2, 1.6 copies, and the first two particles get none."""
+    """Why its drawn part is not the reference: N w = .4, .8, 1.2, 1.6 copies, and the first two particles get
+    none."""
     weights = np.array([0.1, 0.2, 0.3, 0.4])
     theirs = np.concatenate([filterpy.monte_carlo.residual_resample(weights) for _ in range(500)])
     assert_array_equal(np.bincount(theirs, minlength=4)[:2], [0, 0])

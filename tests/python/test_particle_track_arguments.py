@@ -1,4 +1,5 @@
-"""Arguments of the particle tracker that cannot be used: each is named, with what was expected and what came."""
+"""Arguments of the particle tracker that cannot be used: each is named, with what was expected and what
+came."""
 
 import numpy as np
 import pytest

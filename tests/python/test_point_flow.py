@@ -1,4 +1,5 @@
-"""Corners, and flow at points: against synthetic motion, and against OpenCV on recordings (skipped where either is missing)."""
+"""Corners, and flow at points: against synthetic motion, and against OpenCV on recordings (skipped where
+either is missing)."""
 
 import os
 from pathlib import Path

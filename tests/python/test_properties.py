@@ -48,9 +48,11 @@ def test_powers_of_two_change_no_bit_of_the_instantaneous_flow(seed, power):
 
 
 def symmetry_tolerance(method):
-    """Iterations go row by row; sites are every second pixel from the upper left corner, and the coupling of neighbours is stopped before it has converged.
+    """Iterations go row by row; sites are every second pixel from the upper left corner, and the coupling of
+    neighbours is stopped before it has converged.
 
-    The last of an even number of columns has no site of its own: there the field is extrapolated, at the other rim it is not.
+    The last of an even number of columns has no site of its own: there the field is extrapolated, at the
+    other rim it is not.
     """
     if method == "coarse_to_fine":
         return {"rtol": 0.0, "atol": 0.05}
@@ -58,7 +60,8 @@ def symmetry_tolerance(method):
 
 
 def compared(method):
-    """The part of the frame that symmetries are looked at in: windows at the rim and in the corners of so small a frame are mostly extrapolation."""
+    """The part of the frame that symmetries are looked at in: windows at the rim and in the corners of so
+    small a frame are mostly extrapolation."""
     return np.s_[4:-4, 4:-4] if method == "coarse_to_fine" else np.s_[:, :]
 
 

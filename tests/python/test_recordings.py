@@ -1,4 +1,5 @@
-"""Recordings with a truth: what the coarse-to-fine estimate reaches with one setting for all. Skipped where they are not there (JACOFLOW_DATA names their folder)."""
+"""Recordings with a truth: what the coarse-to-fine estimate reaches with one setting for all. Skipped where
+they are not there (JACOFLOW_DATA names their folder)."""
 
 import os
 from pathlib import Path
@@ -19,7 +20,8 @@ REACHED = {
     "_piv DNS_turbulence_00001": (0.061, 0.0154),
     "_piv backstep_Re800_00001": (0.032, 0.0025),
 }
-"""Bounds of the mean end-point error (px) and of the Jacobian's error (1/frame) of the preset `balanced`; tighten them with the estimator."""
+"""Bounds of the mean end-point error (px) and of the Jacobian's error (1/frame) of the preset `balanced`;
+tighten them with the estimator."""
 
 PAIRS = {
     "_rubber_whale": (0.1, 0.0149),
@@ -60,7 +62,8 @@ def test_errors_are_within_reach(bench, name, frames):
 
 
 def test_strain_is_better_than_opencv_at_its_best(bench):
-    """Sample 14 of the image-correlation challenge: u and u_x nearer to the commanded ones than either flow of OpenCV after the Gaussian that suits it best."""
+    """Sample 14 of the image-correlation challenge: u and u_x nearer to the commanded ones than either flow
+    of OpenCV after the Gaussian that suits it best."""
     accuracy, setting, samples = bench
     read(samples.read_strain)
     row = accuracy.strain(DATA, [setting])[-1]
@@ -80,7 +83,8 @@ def steady_flow():
 
 @pytest.mark.parametrize("count", [2, 3])
 def test_estimates_of_a_steady_flow_agree_within_their_deviations(count):
-    """Flow of up to 15 px/frame, from frames 1-2, 2-3, 3-4 and from 1-2-3, 2-3-4: differences over their standard deviation."""
+    """Flow of up to 15 px/frame, from frames 1-2, 2-3, 3-4 and from 1-2-3, 2-3-4: differences over their
+    standard deviation."""
     frames = steady_flow()
     fields = [jacoflow.flow(*frames[k : k + count], method="coarse_to_fine") for k in range(5 - count)]
     inner = np.s_[16:-16, 16:-16]

@@ -125,7 +125,8 @@ def test_what_cannot_be_is_said_before_the_first_frame(options, words):
 
 
 def test_bias_that_does_not_average_out_is_reported():
-    """Particles in a vortex: what windows lose of its bend is lost in every frame. After 23 frames the intervals still hold the truth."""
+    """Particles in a vortex: what windows lose of its bend is lost in every frame. After 23 frames the
+    intervals still hold the truth."""
     shares = []
     for seed in range(3):
         scene = scenes.Scene("vortex", width=128, height=128, random_state=seed, carrier="particles")

@@ -144,7 +144,8 @@ def test_what_counts_as_motion_is_distinguished_from_the_background_and_not_from
 @pytest.mark.parametrize("level", [140.0, 200.0])
 @pytest.mark.parametrize("pan", [(-3.0, 1.0), (-1.0, 0.0), (-1.5, 0.5), (2.0, 2.0)])
 def test_local_does_not_claim_the_scene_for_its_target(pan, level):
-    """Under a camera that moves all that is in the window does; what is said to be tracked must be the target."""
+    """Under a camera that moves all that is in the window does; what is said to be tracked must be the
+    target."""
     scene = tracking_hard_scenes.scene("pan", square(circle(20.0), level=level), motion=line((0.0, 0.0), pan))
     found = followed(scene, method="local")
     far = np.linalg.norm(found.position - scene.centres, axis=1) > 10.0

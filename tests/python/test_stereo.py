@@ -350,7 +350,8 @@ def test_results_pickle():
 
 @pytest.mark.parametrize("gain", [0.9, 0.6, 0.4, 1.6])
 def test_another_gain_of_the_right_camera_costs_a_tenth_of_a_pixel_at_most(gain):
-    """A bias drops out of everything; of a gain some hundredths are left, which move the steps along x by less than a twentieth of a px."""
+    """A bias drops out of everything; of a gain some hundredths are left, which move the steps along x by
+    less than a twentieth of a px."""
     step = small()[0]
     found = disparity(step.left, step.right)
     again = disparity(step.left.astype(float), gain * step.right.astype(float) + 10)

@@ -22,7 +22,8 @@ def cells(seed=1, rows=15, columns=26):
 
 
 def sequence(steps=5):
-    """A wall that moves 2 px/step to the right at disparity -4, before it a board that moves 3 px/step to the left at disparity 5: left and right views."""
+    """A wall that moves 2 px/step to the right at disparity -4, before it a board that moves 3 px/step to the
+    left at disparity 5: left and right views."""
     wall, board = cells(), cells(2)[:48, :56]
     for t in range(steps):
         left, right = (wall[:, 24 - 2 * t + shift : 184 - 2 * t + shift].copy() for shift in (0, -4))
@@ -349,7 +350,8 @@ def test_what_leaves_the_picture_is_measured_while_half_of_it_is_left(mode):
         if 1 <= t <= 5:
             board = max(boards, key=lambda c: c.n_pixels)
             assert np.allclose(board.velocity, [16, 0, 0], atol=0.1)
-            # Of its 207 edge pixels at step 4 only 102 are in the picture at step 5, less than half: it coasts, unless strays tip the scales.
+            # Of its 207 edge pixels at step 4 only 102 are in the picture at step 5, less than half: it
+            # coasts, unless strays tip the scales.
             assert t == 5 or not board.coasting
         # At step 5 there are 20 px of it, at step 6 only 4: nothing can be measured between them.
         if t == 6:

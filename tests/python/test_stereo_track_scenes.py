@@ -1,4 +1,5 @@
-"""The stereo tracker on synthetic scenes with exact truth: the specification's figures, identities, exposure."""
+"""The stereo tracker on synthetic scenes with exact truth: the specification's figures, identities,
+exposure."""
 
 from dataclasses import replace
 from functools import cache, lru_cache
@@ -37,7 +38,8 @@ def crossing_sequence(seed):
 
 
 class Matched:
-    """A tracker that keeps the disparities of a sequence in `found`, or takes those that another one kept there: matching takes longer than all else."""
+    """A tracker that keeps the disparities of a sequence in `found`, or takes those that another one kept
+    there: matching takes longer than all else."""
 
     def __init__(self, tracker, found):
         self.tracker, self.found, self.given = tracker, found, iter([*found])
@@ -59,7 +61,8 @@ class Matched:
 
 @cache
 def crossing_on_paper(seed):
-    """Purity, recalls and paths of the paper's mode on a texture of the crossing, means over three starts of the mixture."""
+    """Purity, recalls and paths of the paper's mode on a texture of the crossing, means over three starts of
+    the mixture."""
     scene, found = crossing(), []
     trackers = [Matched(StereoTracker("paper", disparity_range=scene.disparity_range, random_state=start), found) for start in range(3)]
     each = [follow(scene, crossing_sequence(seed), tracker, False)[0] for tracker in trackers]
@@ -155,7 +158,8 @@ def test_the_papers_mode_on_the_crossing_is_the_specifications_in_the_mean():
 
 @pytest.mark.parametrize("scene", [crossing, cart])
 def test_a_missing_pair_changes_no_name(scene):
-    """Twice the time went by without `dt`: the cart recedes by 6 px of disparity at once, which is a jump but for all of it being seen there."""
+    """Twice the time went by without `dt`: the cart recedes by 6 px of disparity at once, which is a jump but
+    for all of it being seen there."""
     sequence = drawn(scene())[:9]
     scores = scored(scene(), "improved", [*sequence[:4], *sequence[5:]])
     assert scores.id_share(1) == 1.0 and scores.id_share(2) == 1.0
@@ -169,7 +173,8 @@ def test_who_goes_away_among_objects_at_rest_is_followed():
     assert scores.path(1) == 8 and scores.id_kept(1) == 10
     for kind in ("affine", "velocity"):
         assert (np.median(scores.motion_errors(kind)[1], axis=0) <= (0.02, 0.02, 0.022)).all()
-    # Beside the median of the truth, as 5.2 words it, by which one row of its outline too many makes 0.065 along y.
+    # Beside the median of the truth, as 5.2 words it, by which one row of its outline too many makes 0.065
+    # along y.
     u, v, w = np.median(scores.motion_errors("median")[1], axis=0)
     assert u <= 0.02 and v < 0.065 and w <= 0.022
 

@@ -1,4 +1,5 @@
-"""How the gradient tracker begins: boxes round what is no square, faint targets at rest, frames that show nothing, and options and numbers that it does not take."""
+"""How the gradient tracker begins: boxes round what is no square, faint targets at rest, frames that show
+nothing, and options and numbers that it does not take."""
 
 import dataclasses
 
@@ -40,7 +41,8 @@ def test_a_frame_that_shows_nothing_is_not_tracked_in_right_after_the_first(brig
 @pytest.mark.parametrize("value", [1e10, -1e18, 1e30, 1.7e308])
 @pytest.mark.parametrize("white", [1.0, 255.0])
 def test_numbers_that_are_no_brightness_do_no_harm_later(value, white):
-    """A whole frame of them, or with them added, cannot be used; some pixels on the target are hidden; of either white of floats."""
+    """A whole frame of them, or with them added, cannot be used; some pixels on the target are hidden; of
+    either white of floats."""
     scene = tracking_scenes.simulation(1, "smooth:4,90,20", 20.0)
     frames = scene.frames() * (white / 255.0)
     x, y, w, h = scene.boxes[22].astype(int)
@@ -83,7 +85,8 @@ def test_points_may_be_anywhere_on_the_outer_pixels():
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize(("outline", "side", "larger"), [("cross", 21.0, 1.3), ("diamond", 21.0, 1.2)])
 def test_a_box_too_large_round_a_figure_that_does_not_fill_it_becomes_that_of_the_figure(outline, side, larger, kind):
-    """Half of such a box or more is background: as long as that is missed, it is the box that is wrong, and nothing covers the target."""
+    """Half of such a box or more is background: as long as that is missed, it is the box that is wrong, and
+    nothing covers the target."""
     shares, near = [], []
     for seed in range(6):
         scene = outlined(outline, side, larger, kind, seed)
@@ -96,7 +99,8 @@ def test_a_box_too_large_round_a_figure_that_does_not_fill_it_becomes_that_of_th
 @pytest.mark.parametrize("above", [10.0, 15.0, 20.0])
 @pytest.mark.parametrize("kind", ["smooth:4,90,10", "smooth:4,90,20", "smooth:4,90,40"])
 def test_a_faint_target_before_a_rough_background_is_followed_from_the_first_frame(kind, above):
-    """Its speed is not known then, and the gradients from rest lead to the wrong side on some of these backgrounds."""
+    """Its speed is not known then, and the gradients from rest lead to the wrong side on some of these
+    backgrounds."""
     for seed in (3, 8, 13):
         scene = Scene("faint", (Plane(kind, seed),), square(circle(20.0), level=90.0 + above))
         assert success(scene, follow(scene)) >= 0.9, seed
@@ -112,7 +116,8 @@ def test_a_box_too_large_is_not_lost_before_rough_background(larger):
 
 @pytest.mark.parametrize("speed", [0.8, 2.0])
 def test_background_in_the_box_does_not_move_the_position_while_it_is_hidden_on_one_side(speed):
-    """Behind a moving disc the background of the corners of its box is seen last; there they counted as target, and the position was 1.3 px off, 14 standard deviations."""
+    """Behind a moving disc the background of the corners of its box is seen last; there they counted as
+    target, and the position was 1.3 px off, 14 standard deviations."""
     for seed in range(2):
         path = line((70.0, 128.0), (speed, 0.0))
         scene = Scene("disc", (Plane("smooth:4,110,25", seed),), disc(path, np.full(51, 14.0), level=170.0))

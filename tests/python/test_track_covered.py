@@ -1,4 +1,5 @@
-"""Small targets that go behind a bar: what is left of one at the bar's edge is not all of it, whatever its shape, contrast and growth."""
+"""Small targets that go behind a bar: what is left of one at the bar's edge is not all of it, whatever its
+shape, contrast and growth."""
 
 
 import numpy as np
@@ -42,7 +43,8 @@ def test_a_small_target_comes_out_again_from_behind_a_bar(options, seeds):
     ("level", "bar_level"), [(200.0, 40.0), (200.0, 90.0), (140.0, 220.0), (20.0, 90.0), (20.0, 250.0)]
 )
 def test_bars_and_targets_of_any_brightness(level, bar_level, kind):
-    """Dark and bright targets behind bars that are darker, brighter, or as bright as the background: each of four backgrounds is gone through."""
+    """Dark and bright targets behind bars that are darker, brighter, or as bright as the background: each of
+    four backgrounds is gone through."""
     reached = [overlaps(behind_a_bar(seed, 2.4, level=level, kind=kind, bar_level=bar_level)) for seed in range(30, 34)]
     assert min(each[-8:].mean() for each in reached) >= 0.8
     assert np.mean([np.mean(each > 0.5) for each in reached]) >= 0.9 and min(np.mean(each > 0.5) for each in reached) >= 0.8

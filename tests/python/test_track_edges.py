@@ -1,4 +1,5 @@
-"""Edge cases of the gradient tracker: wrong boxes, starts beside the target, windows larger than the frame, targets that stop, crawl, leave and return."""
+"""Edge cases of the gradient tracker: wrong boxes, starts beside the target, windows larger than the frame,
+targets that stop, crawl, leave and return."""
 
 import dataclasses
 
@@ -17,20 +18,22 @@ SIMULATION = {scene.name: scene for scene in tracking_scenes.simulations()}
 
 @pytest.mark.parametrize(("right", "down", "larger"), [(2, -2, 1), (-2, 2, 1), (2, 2, 1), (0, 0, 1.4), (0, 0, 0.6), (1, -1, 1.2), (-2, 0, 1.3), (0, 2, 0.7)])
 def test_support_adapts_to_wrong_boxes(right, down, larger):
-    """Box off by 2 px or by 40 % of its size: the target is held all the same, in Simulation 1 on several backgrounds, slow and fast."""
+    """Box off by 2 px or by 40 % of its size: the target is held all the same, in Simulation 1 on several
+    backgrounds, slow and fast."""
     for kind, radius in (("flat:90", 20.0), ("smooth:4,90,20", 8.0), ("smooth:2,128,40", 20.0), ("fractal:1,90,30", 8.0)):
         scene = tracking_scenes.simulation(1, kind, radius, seed=4)
         x, y, w, h = scene.start_box
         wrong = dataclasses.replace(scene, start=(x + right + w * (1 - larger) / 2, y + down + h * (1 - larger) / 2, w * larger, h * larger))
         found = follow(wrong)
         off = np.linalg.norm(found.position - scene.centres, axis=1)
-        # An even target does not show where in it a smaller box is, until its edges are learnt.
+        # An even target does not show where in it a smaller box is, until its edges are learned.
         assert off[1:].max() <= (3.0 if larger >= 1 else 4.0) and np.median(off[8:]) <= 1.0, (kind, radius)
         assert success(wrong, found) >= 0.98, (kind, radius)
 
 
 def test_starts_five_px_beside_the_centre_find_the_box():
-    """Only a point near the target is given: its box is found in two frames, and it is followed to the end."""
+    """Only a point near the target is given: its box is found in two frames, and it is followed to the
+    end."""
     overlaps = []
     for number, scene in enumerate(SIMULATION.values()):
         angle = number * 2.4
@@ -43,14 +46,16 @@ def test_starts_five_px_beside_the_centre_find_the_box():
 
 
 def test_stated_deviations_hold_the_centre():
-    """Within two stated deviations in 95 % of frames would be right for independent errors; those of the learnt outline stay from frame to frame. While it is being learnt, in the first ten
-    frames, its middle may still move, and large targets tell so."""
+    """Within two stated deviations in 95 % of frames would be right for independent errors; those of the
+    learned outline stay from frame to frame. While it is being learned, in the first ten frames, its middle
+    may still move, and large targets tell so."""
     held = []
     for scene in SIMULATION.values():
         found = follow(scene)
         deviations = np.sqrt(found.covariance[:, :, 0, 0])
         held.append((np.abs(found.position - scene.centres) < 2 * deviations)[1:].mean())
-        # The specification's range for targets of one size; it says itself that growing ones are told too sure of.
+        # The specification's range for targets of one size; it says itself that growing ones are told too
+        # sure of.
         assert held[-1] >= 0.92 or scene.name.startswith("S3"), scene.name
         assert deviations[5:].max() <= 0.9 and deviations[10:].max() <= 0.45, scene.name
     assert np.mean(held) >= 0.95
@@ -252,7 +257,8 @@ def box_about(centre, side):
 @pytest.mark.parametrize("bar", [8, 15])
 @pytest.mark.parametrize("side", [25, 33, 51])
 def test_a_large_plain_target_passes_behind_a_bar(side, bar, seed):
-    """The bar's edge stands for the target's own and would hold it back: a strip of a large target is little."""
+    """The bar's edge stands for the target's own and would hold it back: a strip of a large target is
+    little."""
     path = np.stack([30 + 1.5 * np.arange(80), np.full(80, 80.0)], axis=1)
     found = track.track(plain(path, side, bar, seed), box_about(path[0], side))
     errors = np.linalg.norm(found.position - path, axis=1)

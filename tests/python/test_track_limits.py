@@ -1,4 +1,5 @@
-"""Where the gradient tracker used to go wrong: large targets that turn, weak texture, boxes much too small, jumps of brightness, a camera that moves, sizes that change unseen."""
+"""Where the gradient tracker used to go wrong: large targets that turn, weak texture, boxes much too small,
+jumps of brightness, a camera that moves, sizes that change unseen."""
 
 
 import numpy as np
@@ -29,7 +30,8 @@ def angle_error(scene, found):
 
 @pytest.mark.parametrize("radius", [8.0, 16.0, 24.0, 32.0])
 def test_an_angle_that_a_frame_does_not_show_is_held(radius):
-    """Before this background the little square is as bright as much of what is behind it; its angle must not fall back to that of the box."""
+    """Before this background the little square is as bright as much of what is behind it; its angle must not
+    fall back to that of the box."""
     scene = tracking_scenes.simulation(2, "smooth:2,128,40", radius)
     assert angle_error(scene, follow(scene)) <= 5.0
 
@@ -48,7 +50,8 @@ def test_a_disc_is_not_turned():
 
 
 def normalised_squares(scene):
-    """Of the position's errors, one a frame in which the target is seen: 2 on average where the stated covariance is right."""
+    """Of the position's errors, one a frame in which the target is seen: 2 on average where the stated
+    covariance is right."""
     found = follow(scene)
     errors = found.position - scene.centres
     return (errors**2 / found.covariance[:, :, 0, 0]).sum(axis=1)[(found.status == "tracking") & (np.arange(len(found)) > 2)]
@@ -56,7 +59,8 @@ def normalised_squares(scene):
 
 @pytest.mark.parametrize(("degrees", "noise", "seeds"), [(2.0, 8.0, (4,)), (3.0, 2.0, (3,))])
 def test_stated_covariances_of_large_targets_hold_what_they_say(degrees, noise, seeds):
-    """Corners that turn out of the upright box are not background; noise in the template stays from frame to frame, and no filter takes it away."""
+    """Corners that turn out of the upright box are not background; noise in the template stays from frame to
+    frame, and no filter takes it away."""
     squares = [
         normalised_squares(turning(side, degrees, noise, seed, textured)) for side in (45, 61) for seed in seeds for textured in (False, True)
     ]
@@ -81,7 +85,8 @@ def test_a_box_forty_percent_too_small_becomes_that_of_the_target(side, textured
 @pytest.mark.parametrize("change", ["uniform", "brighter"])
 @pytest.mark.parametrize("level", [1000.0, 1e5])
 def test_frames_at_quite_another_level_do_no_harm(level, change, kind):
-    """Uniform frames are not seen through, and a constant that is added to all of a frame is taken off again; neither is taken for noise."""
+    """Uniform frames are not seen through, and a constant that is added to all of a frame is taken off again;
+    neither is taken for noise."""
     scene = tracking_hard_scenes.scene("level", kind=kind)
     frames = scene.frames().astype(np.float64)
     frames[25:28] = level if change == "uniform" else frames[25:28] + level
@@ -125,7 +130,8 @@ def bars(centre, size):
 
 
 def test_a_target_that_grows_behind_something_gets_its_new_size():
-    """Its size is held while it is hidden; what comes out is larger, and is not covered for ever by what its old size leaves out."""
+    """Its size is held while it is hidden; what comes out is larger, and is not covered for ever by what its
+    old size leaves out."""
     times = tracking_scenes.TIMES
     side = np.interp(times, [18, 26], [16, 24])
     target = tracking_scenes.figure(line((70.0, 128.0), (2.0, 0.3)), np.stack([side, side], axis=1), 200.0)
@@ -145,12 +151,14 @@ def test_a_target_that_goes_along_a_low_wall_keeps_its_size(side):
 
 
 FENCES = [(21.0, 12.0, 6.0, 1, 0.65), (31.0, 12.0, 6.0, 0, 0.9), (13.0, 12.0, 6.0, 0, 0.7)]
-"""Side of a target, gaps and bars of a fence, px, whether it is 2.3 px farther on and the target .3 px/frame slower, and least mean success."""
+"""Side of a target, gaps and bars of a fence, px, whether it is 2.3 px farther on and the target .3 px/frame
+slower, and least mean success."""
 
 
 @pytest.mark.parametrize(("side", "gap", "bar", "moved", "least"), FENCES)
 def test_a_fence_is_gone_behind_as_often_as_stated(side, gap, bar, moved, least):
-    """Large targets come behind it in their first frames, when their support is not yet settled; small ones fit between two bars when they are thought smaller. On a single background either may go wrong."""
+    """Large targets come behind it in their first frames, when their support is not yet settled; small ones
+    fit between two bars when they are thought smaller. On a single background either may go wrong."""
     pickets = tuple(bars((90.0 + 2.3 * moved + k * (gap + bar), 127.5), (bar, 256.0)) for k in range(int(80 // (gap + bar))))
     reached = []
     for seed in range(3, 13 if side > 13 else 8):
@@ -190,6 +198,7 @@ def test_what_comes_out_from_behind_something_is_not_sure_of_its_place(kind):
 
 @pytest.mark.parametrize("seed", [101, 105, 108, 115, 119])
 def test_the_plane_behind_the_target_is_the_scene_where_two_move(seed):
-    """With the motion of both halves together, texture of the one behind the target was learnt as its own."""
+    """With the motion of both halves together, texture of the one behind the target was learned as its
+    own."""
     scene = tracking_hard_scenes.two_planes(seed)
     assert success(scene, follow(scene)) >= 0.95

@@ -1,4 +1,5 @@
-"""Parts of the gradient tracker that stand for themselves: the Gauss-Markov filter and the first object that moves."""
+"""Parts of the gradient tracker that stand for themselves: the Gauss-Markov filter and the first object that
+moves."""
 
 import pickle
 

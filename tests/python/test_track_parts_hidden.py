@@ -1,4 +1,5 @@
-"""Targets of which only a part is seen: begun half behind something still, going beyond the border, and large ones of which only the outline moves."""
+"""Targets of which only a part is seen: begun half behind something still, going beyond the border, and large
+ones of which only the outline moves."""
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ def rough(shape, sigma, mean, deviation, seed):
 
 
 def movie(path, side, *, texture=0.0, hidden=None, bar=130.0, seed=0):
-    """Frames (T, H, W) of a square along a path (T, 2), with a bar over the columns `hidden` = (first, beyond the last)."""
+    """Frames (T, H, W) of a square along a path (T, 2), with a bar over the columns `hidden` = (first, beyond
+    the last)."""
     rng = np.random.default_rng(seed)
     y, x = np.mgrid[: SHAPE[0], : SHAPE[1]].astype(float)
     behind = rough(SHAPE, 3, 90, 20, seed + 100)

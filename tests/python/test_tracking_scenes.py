@@ -1,4 +1,5 @@
-"""What trackers are measured on and with: drawn figures, paths, truth and scores (no rival is needed here)."""
+"""What trackers are measured on and with: drawn figures, paths, truth and scores (no rival is needed
+here)."""
 
 
 import numpy as np
