@@ -1,9 +1,10 @@
 """Coarse-to-fine estimate between frames that are not equally bright, beside saturated pixels, over large
 motions, beside a motion boundary (of three frames too), beside a mask's edge and of undersampled texture:
-errors, px; share of errors above 1 px that neither status nor standard deviation states; share of the sites of
-independent noise that are valid; change by saturated pixels, standard deviations; bias of pairs in noise, px;
-errors in waves and in narrow frames, px; share of errors outside 95 % intervals, of undersampled texture and of
-discs that smoothness holds back, whose own errors are relative to their motion; time on equal frames."""
+errors, px; share of errors above 1 px that neither status nor standard deviation states; share of the sites
+of independent noise that are valid; change by saturated pixels, standard deviations; bias of pairs in noise,
+px; errors in waves and in narrow frames, px; share of errors outside 95 % intervals, of undersampled texture
+and of discs that smoothness holds back, whose own errors are relative to their motion; time on equal
+frames."""
 
 from __future__ import annotations
 

@@ -45,8 +45,8 @@ def felzenszwalb(
     image : array (H, W) or (H, W, 3) of uint8, uint16, float32 or float64
         White is 255, 65535 or 1. Floats beyond 1 are taken as they are: the unit of `scale` does not change.
         float64 is computed in double precision, everything else in single precision. Pixels that are
-        masked or not finite are left out of the smoothing; their edges merge nothing but regions smaller than `min_size`,
-        after all other edges.
+        masked or not finite are left out of the smoothing; their edges merge nothing but regions smaller
+        than `min_size`, after all other edges.
     scale : levels of 255, times px
         The paper's `k`: the larger, the larger the regions. At least 0. Same unit as in scikit-image's
         function of the same name.

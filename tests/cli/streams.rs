@@ -208,7 +208,7 @@ fn the_first_interrupt_ends_the_opening_of_a_silent_pipe() {
         "flow pipe.y4m -o out",
         "measure pipe.y4m --quantity u -o out.csv",
         "filter pipe.y4m -o out",
-        "track pipe.y4m --box 5,5,9,9 -o out.csv",
+        "track pipe.y4m --bbox 5,5,9,9 -o out.csv",
         "track pipe.y4m pipe.y4m --method stereo -o out.csv",
         "stereo pipe.y4m pipe.y4m -o out",
         "egomotion pipe.y4m --intrinsics 60,60,32,24 -o out.csv",

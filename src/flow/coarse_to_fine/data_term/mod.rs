@@ -150,8 +150,8 @@ impl<'a, T: SimdReal> DataTerm<'a, T> {
         self.sum(Sums::Moments, (size, views), motion, scale, out)
     }
 
-    /// The [`MEANS`] planes of the normal equations for the flow that the motion leaves: the windows' means of
-    /// `P_uu`, `P_uv`, `P_vv`, `q_u`, `q_v` and `e`, where `q` has `-R` on its right side.
+    /// The [`MEANS`] planes of the normal equations for the flow that the motion leaves: the windows' means
+    /// of `P_uu`, `P_uv`, `P_vv`, `q_u`, `q_v` and `e`, where `q` has `-R` on its right side.
     pub fn linearise_remainder(
         &self,
         size: (usize, usize),

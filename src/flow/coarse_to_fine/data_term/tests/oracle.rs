@@ -104,7 +104,8 @@ impl Case {
         })
     }
 
-    /// Seven products a pixel, the two right sides without the motion, and |R| at the pixels of the subsample.
+    /// Seven products a pixel, the two right sides without the motion, and |R| at the pixels of the
+    /// subsample.
     fn products(&self) -> (Vec<[f64; 9]>, Vec<f64>) {
         let (w, h) = self.size;
         let (edge_x, edge_y) = (w as f64 - 2.0, h as f64 - 2.0);
