@@ -10,7 +10,6 @@
 pub const HEURISTICS: &[(&str, &str)] = &[
     ("motion3d.single_noise", "of few points one motion in larger noise is compared with a selection"),
     ("motion3d.second_motion", "the rejected points are searched for a motion of their own"),
-    ("motion3d.depth_gate", "points with unlikely depths are left out before the last fit"),
     ("motion3d.many_outliers", "among many outliers candidates are refined with outlier posteriors"),
     ("motion3d.outlier_mixture", "the last step weighs points by their outlier posterior"),
     ("motion3d.larger_noise", "noise of the inliers that exceeds the given one inflates the covariance"),

@@ -70,6 +70,16 @@ def few(seed: int) -> coverage.Estimated:
     return found, make.u, make.w
 
 
+def ahead(seed: int) -> coverage.Estimated:
+    """300 points of a wide field in much noise, of a camera that goes forward to a curved wall: the epipole lies
+    among them."""
+    make = scenes.differential("smooth", "forward", 300, 0.1, seed, 1.0)
+    found = motion3d.estimate_motion(
+        make.points, make.flow, noise_std=make.noise_std, placement="start", threads=1
+    )
+    return found, make.u, make.w
+
+
 GROUPS: dict[str, list[Callable[[int], coverage.Estimated]]] = {
     "random": [lambda seed: random_scene(seed, False), lambda seed: random_scene(seed, True)],
     "objects": [lambda seed, ratio=ratio: layouts.moving_object(seed, ratio) for ratio in (1.0, 20.0, 100.0)]
@@ -81,6 +91,8 @@ GROUPS: dict[str, list[Callable[[int], coverage.Estimated]]] = {
     "exact": [exact],
     "narrow": [narrow],
     "few": [few],
+    # Rare differences need more scenes.
+    "ahead": [lambda seed, more=more: ahead(seed + more) for more in range(0, 5000, 1000)],
     "lenses": [coverage.long_lens, layouts.band],
     "patches": [coverage.patches],
     "plain": [lambda seed: plain(seed, 1000)],

@@ -48,10 +48,9 @@ const STOPPING: StoppingCriteria = StoppingCriteria { deviations: 1e-2, ..Stoppi
 /// A relative change of the noise that does not change the inliers.
 const SETTLED_NOISE: f64 = 0.02;
 
-/// Rounds towards a fixed set of inliers, towards the noise of few points, and of the depth-consistency test.
+/// Rounds towards a fixed set of inliers, and towards the noise of few points.
 const ROUNDS: usize = 10;
 const FEW_ROUNDS: usize = 4;
-const DEPTH_ROUNDS: usize = 2;
 
 /// Share of outliers among the inliers from which on they matter for the search.
 const MATTER: f64 = 0.03;
@@ -168,14 +167,6 @@ fn of_candidates(observations: &Observations, mut candidates: Candidates, rng: C
     let mut competing = competing_motions(on, &candidates);
     let mut found = settle(observations, candidates.first()?.0)?;
     let gate = DepthConsistency::new(observations);
-    for _ in 0..if keeps("motion3d.depth_gate") { DEPTH_ROUNDS } else { 0 } {
-        let (kept, _) = gate.passed(&found);
-        if kept.len() < UNKNOWNS || kept.len() == found.inliers.len() {
-            break;
-        }
-        let motion = refine(&observations.subset(&kept), found.motion, STOPPING).motion;
-        found = Consensus::new(motion, inliers_of(observations, &motion));
-    }
     let (mut inliers, mut outliers) = gate.passed(&found);
     let many = keeps("motion3d.many_outliers") && outliers.as_ref().is_some_and(|outliers| outliers.share > MATTER);
     if many && let Some((motion, others)) = among_many_outliers(observations, on, &gate, &candidates) {
