@@ -71,8 +71,8 @@ def few(seed: int) -> coverage.Estimated:
 
 
 def ahead(seed: int) -> coverage.Estimated:
-    """300 points of a wide field in much noise, of a camera that goes forward to a curved wall: the epipole lies
-    among them."""
+    """300 points of a wide field in much noise, of a camera that goes forward to a curved wall: the epipole
+    lies among them."""
     make = scenes.differential("smooth", "forward", 300, 0.1, seed, 1.0)
     found = motion3d.estimate_motion(
         make.points, make.flow, noise_std=make.noise_std, placement="start", threads=1

@@ -95,8 +95,8 @@ def large_rates(seeds: tuple[int, ...]) -> list[Row]:
 
 
 def unrelated(seeds: tuple[int, ...]) -> list[Row]:
-    """Shares of the sites that are `valid` between frames of independent noise of a pixel, of noise that moves
-    too far, and of moving texture in noise as strong as itself and stronger."""
+    """Shares of the sites that are `valid` between frames of independent noise of a pixel, of noise that
+    moves too far, and of moving texture in noise as strong as itself and stronger."""
     rows: list[Row] = []
     for name, (ratio, shift) in {
         "independent noise": (None, 0), "noise of a pixel, 64 px": (0.0, 64), "texture, noise as strong": (1.0, 2),

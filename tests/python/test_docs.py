@@ -80,7 +80,8 @@ def stub_docstrings():
 
 @pytest.mark.parametrize(("name", "stub", "compiled"), list(stub_docstrings()))
 def test_stub_and_compiled_module_say_the_same(name, stub, compiled):
-    assert stub == inspect.cleandoc(compiled), name
+    # Lines end elsewhere: methods are indented in the stub.
+    assert stub.split() == compiled.split(), name
 
 
 def test_the_stub_of_flow_has_the_options_of_estimate():

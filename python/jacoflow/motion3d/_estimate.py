@@ -67,8 +67,8 @@ def estimate_motion(
     Parameters
     ----------
     points : array (N, 2), px, or (N, 3), unit bearings
-        Where: with K in px, without on the plane at distance 1, within 10; (N, 3) on the sphere. Rows that are
-        not finite are left out.
+        Where: with K in px, without on the plane at distance 1, within 10; (N, 3) on the sphere. Rows that
+        are not finite are left out.
     flow : array (N, 2), px/frame with K, else per frame; (N, 3) on the sphere
         Displacement over one frame.
     K : array (3, 3) or None

@@ -42,7 +42,8 @@ pub struct FieldOptions {
     pub region: Option<Rect>,
     /// Only points outside of this rectangle of pixels.
     pub excluded: Option<Rect>,
-    /// Maximum number of points, of the region if there is one: above it the grid is coarser. Default: no limit.
+    /// Maximum number of points, of the region if there is one: above it the grid is coarser. Default: no
+    /// limit.
     pub max_points: Option<usize>,
     /// Side of square windows, px, each of which becomes one patch with six numbers; not with `spacing` and
     /// `max_points`. Default: points.
@@ -195,8 +196,8 @@ fn systematic_errors<T: Real>(field: &FlowField<T>) -> SystematicErrors {
     systematic_errors_of(site_pixels(field, step).filter_map(|(site, _)| measurement(field, site)))
 }
 
-/// Systematic errors of points with flow and covariance: the scale is off by what would be the whole error of the
-/// points that determine it best.
+/// Systematic errors of points with flow and covariance: the scale is off by what would be the whole error of
+/// the points that determine it best.
 fn systematic_errors_of(points: impl Iterator<Item = (Vector2<f64>, Matrix2<f64>)>) -> SystematicErrors {
     let (mut squares, mut variances) = (Vec::new(), Vec::new());
     for (flow, covariance) in points {

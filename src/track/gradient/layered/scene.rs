@@ -17,8 +17,8 @@ const MAX_WILD_FRAMES: usize = 10;
 /// Contrast of the scene over that of the frame before, from which on down it is gone.
 const MAX_CONTRAST_RATIO: f64 = 0.25;
 
-/// Whether nothing of the scene is left in a frame before anything was measured. The noise is learned from the
-/// first pair: it would hold all that such a frame differs by, and anything would look like the target.
+/// Whether nothing of the scene is left in a frame before anything was measured. The noise is learned from
+/// the first pair: it would hold all that such a frame differs by, and anything would look like the target.
 pub(super) fn is_blank(state: &State, frame: &Frame<f64>) -> bool {
     if state.history.age > 0 {
         return false;

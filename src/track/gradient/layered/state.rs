@@ -16,8 +16,8 @@ const HIDES: (f64, f64) = (0.1, 4.0);
 /// Deviation of the middle of the learned support from that of the target, px: it stays from frame to frame,
 /// and no filter takes it away.
 const OUTLINE: f64 = 0.07;
-/// What noise adds to the deviation of the middle, over noise by contrast, px: what is learned of an edge from
-/// noisy frames stays wrong for as long as it is remembered.
+/// What noise adds to the deviation of the middle, over noise by contrast, px: what is learned of an edge
+/// from noisy frames stays wrong for as long as it is remembered.
 const OUTLINE_IN_NOISE: f64 = 1.4;
 /// Frames after which it is done with that, in any case.
 pub(super) const MAX_SETTLING_FRAMES: usize = 20;
