@@ -13,8 +13,8 @@
 //! [`simd`], [`parallel`], [`buffer_pool`] (0); [`image`], [`scattered`] (1); [`jet`], [`io`], [`synth`] (2);
 //! [`flow`], [`filter`], [`mixture`], [`motion3d`], [`segment`], [`stereo`] (3); [`temporal`], [`track`] (4);
 //! [`pipeline`] (5); [`cli`], the binary (6). Each room from level 1 up, and [`filter`], is a Cargo feature
-//! of its name; `default-features = false, features = ["filter"]` gives the filters alone. The Python binding is
-//! a package of its own, `python/`.
+//! of its name; `default-features = false, features = ["filter"]` gives the filters alone. The Python binding
+//! is a package of its own, `python/`.
 
 // A choice of rooms uses a choice of what the lower ones offer.
 #![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
