@@ -193,7 +193,8 @@ fn python_comment_lines(text: &str) -> Vec<(usize, &str)> {
 fn comment_lines_are_short() {
     let mut wrong = Vec::new();
     for folder in ["python", "benchmarks", "tests", "examples", "docs"] {
-        for file in ["py", "pyi"].into_iter().flat_map(|ending| files(&root().join(folder), ending)) {
+        // The stub of the binding repeats Rust's docstrings with another indent.
+        for file in files(&root().join(folder), "py") {
             for (row, line) in python_comment_lines(&fs::read_to_string(&file).unwrap()) {
                 if line.chars().count() > MAX_COMMENT_LINE && !line.contains(" | ") {
                     wrong.push(format!("{}:{row}", name_of(&file)));

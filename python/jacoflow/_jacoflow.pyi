@@ -115,8 +115,7 @@ _Function: TypeAlias = Callable[[NDArray[np.float64], NDArray[np.float64]], Arra
 _Items: TypeAlias = Sequence[ArrayLike | None] | NDArray[Any]
 
 class JacoflowError(Exception):
-    """Base class of the errors that are jacoflow's own (bad arguments are ValueError or TypeError, files
-    OSError)."""
+    """Base class of the errors that are jacoflow's own (bad arguments are ValueError or TypeError, files OSError)."""
 
 class FormatError(JacoflowError):
     """A file's content is not what its format demands."""
@@ -140,8 +139,8 @@ class FlowField:
     """
     @property
     def flow(self) -> _Floats:
-        """Flow, array (..., H, W, 2): (u, v) along x (right) and y (down), in `unit("u")`: px/frame, lengths
-        in `length_unit` with a pixel pitch, times in seconds with a frame period.
+        """Flow, array (..., H, W, 2): (u, v) along x (right) and y (down), in `unit("u")`: px/frame, lengths in
+        `length_unit` with a pixel pitch, times in seconds with a frame period.
 
         NaN where `status` says why. A read-only view.
         """
@@ -191,13 +190,13 @@ class FlowField:
         """Rank of the equations, uint8 array (..., H, W); None if the method has none."""
     @property
     def condition(self) -> _Floats | None:
-        """Condition number of the equations (largest over smallest singular value), array (..., H, W); None
-        if the method has none.
+        """Condition number of the equations (largest over smallest singular value), array (..., H, W); None if
+        the method has none.
         """
     @property
     def window(self) -> _Floats | None:
-        """Standard deviation of the Gaussian window that the Jacobian rests on, mean of those weighed in at
-        the pixel, array (..., H, W), px; None unless `method="coarse_to_fine"` with `diagnostics=True`.
+        """Standard deviation of the Gaussian window that the Jacobian rests on, mean of those weighed in at the
+        pixel, array (..., H, W), px; None unless `method="coarse_to_fine"` with `diagnostics=True`.
 
         Windows are of fourth order: slopes have the noise of a plain least-squares fit in a window 0.66 times
         as wide, and bias of sixth order.
@@ -212,8 +211,8 @@ class FlowField:
         clockwise on the screen."""
     @property
     def shear_magnitude(self) -> NDArray[np.float64]:
-        """Shear sqrt((L_xx - L_yy)^2 + (L_xy + L_yx)^2), float64 array (..., H, W), 1/frame, or 1/s with a
-        frame period."""
+        """Shear sqrt((L_xx - L_yy)^2 + (L_xy + L_yx)^2), float64 array (..., H, W), 1/frame, or 1/s with a frame
+        period."""
     @property
     def shear_axis(self) -> NDArray[np.float64]:
         """Direction of the greatest stretch, atan2(L_xy + L_yx, L_xx - L_yy) / 2, float64 array (..., H, W),
@@ -237,16 +236,15 @@ class FlowField:
         frame_period."""
     @property
     def rotation_centre(self) -> NDArray[np.float64]:
-        """The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units
-        of the pixel pitch.
+        """The point that does not move, p - M^-1 (u, v), float64 array (..., H, W, 2): (x, y) in px, or units of
+        the pixel pitch.
 
         It need not be in the picture. NaN where there is none. `value` and `std` take its parts,
         rotation_centre_x and rotation_centre_y.
         """
     @property
     def centre_distance(self) -> NDArray[np.float64]:
-        """Distance of the point that does not move, float64 array (..., H, W), px, or units of the pixel
-        pitch."""
+        """Distance of the point that does not move, float64 array (..., H, W), px, or units of the pixel pitch."""
     @property
     def time_to_contact(self) -> NDArray[np.float64]:
         """Time from the field's frame to contact with a surface parallel to the image, float64 array (..., H,
@@ -274,8 +272,8 @@ class FlowField:
         region: ArrayLike | None = None,
         aggregate: Literal["inverse_variance", "median"] | None = None,
     ) -> tuple[float, float, int]:
-        """Mean over a region: (value, standard deviation, number of sites) of the parameter or derived
-        quantity `name`, in its unit.
+        """Mean over a region: (value, standard deviation, number of sites) of the parameter or derived quantity
+        `name`, in its unit.
 
         `region` None for every site, a rectangle (x, y, width, height), a disc (x, y, radius), a polygon of
         corners (N, 2), px, or a boolean mask (H, W); `aggregate` "inverse_variance" (default) weighs by the
@@ -310,9 +308,9 @@ class FlowField:
         """
     @overload
     def advect(self, /, points: ArrayLike, covariance: None = None) -> NDArray[np.float64]:
-        """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all
-        its fields, (T + 1, N, 2), beginning with `points`. Fields at the end without a next frame are left
-        out: those of T frames give where the points are at each of them, (T, N, 2).
+        """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its
+        fields, (T + 1, N, 2), beginning with `points`. Fields at the end without a next frame are left out:
+        those of T frames give where the points are at each of them, (T, N, 2).
 
         `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites
         the flow is bilinear in what the four sites about a point say of it by flow and Jacobian: affine
@@ -328,9 +326,9 @@ class FlowField:
         """
     @overload
     def advect(self, /, points: ArrayLike, covariance: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all
-        its fields, (T + 1, N, 2), beginning with `points`. Fields at the end without a next frame are left
-        out: those of T frames give where the points are at each of them, (T, N, 2).
+        """Carries points along by one frame, p + flow(p): float64 array (N, 2), px; for a stack through all its
+        fields, (T + 1, N, 2), beginning with `points`. Fields at the end without a next frame are left out:
+        those of T frames give where the points are at each of them, (T, N, 2).
 
         `points` (N, 2), columns x and y, px, are where they are at the (first) field's frame. Between sites
         the flow is bilinear in what the four sites about a point say of it by flow and Jacobian: affine
@@ -345,15 +343,14 @@ class FlowField:
         ValueError for a field of points, for other shapes, and for matrices that are no covariance.
         """
     def unit(self, /, name: str) -> str:
-        """Unit of the parameter or derived quantity `name`: lengths in px or `length_unit`, times in frames,
-        or in seconds with a frame period. ValueError for another name."""
+        """Unit of the parameter or derived quantity `name`: lengths in px or `length_unit`, times in frames, or
+        in seconds with a frame period. ValueError for another name."""
     @property
     def points(self) -> NDArray[np.int64]:
         """Pixel (x, y) of each site, int64 array (H, W, 2), for a list of points (N, 2)."""
     @property
     def frame_index(self) -> int:
-        """Index of the frame the estimate belongs to, counted from 0 (no unit); of the first one for a
-        stack."""
+        """Index of the frame the estimate belongs to, counted from 0 (no unit); of the first one for a stack."""
     @property
     def frame_size(self) -> tuple[int, int]:
         """Size (width, height) of the frames, px."""
@@ -372,8 +369,8 @@ class FlowField:
         before and after; "instant", the velocity at frame t (no unit)."""
     @property
     def correlation_length(self) -> float:
-        """How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d;
-        0 where they are independent or it is not known. Of a stack that of the first field.
+        """How far errors of neighbouring estimates go together, px: about exp(-d^2 / (4 l^2)) at distance d; 0
+        where they are independent or it is not known. Of a stack that of the first field.
         """
     @property
     def model(self) -> str:
@@ -385,8 +382,8 @@ class FlowField:
     def shape(self) -> tuple[int, ...]:
         """Shape of the site axes: (H, W), (N,) for points, with a leading T for a stack."""
     def save(self, /, path: _Path, *, options: str = "") -> None:
-        """Writes the field; the extension of `path` chooses the format: .npz (everything, in its units),
-        .flo, .png (KITTI) or .pfm (flow in px/frame only).
+        """Writes the field; the extension of `path` chooses the format: .npz (everything, in its units), .flo,
+        .png (KITTI) or .pfm (flow in px/frame only).
 
         A stack goes to a folder (`path` without extension) as flow_000001.npz, ... by frame index; files of
         these names after its first frame that it does not replace are removed, as they are of a longer run.
@@ -401,10 +398,9 @@ class FlowField:
         *,
         interval: Literal["forward", "central", "instant"] | None = None,
     ) -> FlowField:
-        """The field of flow from elsewhere, px/frame: `std`, `advect`, `region_mean` and motion from flow
-        then work on it: (u, v) of shape (H, W, 2), their Jacobian (H, W, 2, 2), [[u_x, u_y], [v_x, v_y]], and
-        the covariance of (u, v), (H, W, 2, 2), or with a Jacobian of (u, v, u_x, v_x, u_y, v_y), (H, W, 6,
-        6).
+        """The field of flow from elsewhere, px/frame: `std`, `advect`, `region_mean` and motion from flow then
+        work on it: (u, v) of shape (H, W, 2), their Jacobian (H, W, 2, 2), [[u_x, u_y], [v_x, v_y]], and the
+        covariance of (u, v), (H, W, 2, 2), or with a Jacobian of (u, v, u_x, v_x, u_y, v_y), (H, W, 6, 6).
 
         NaN, or masked, where the flow is unknown. Without a Jacobian derivatives read as zero, and
         quantities of them (`divergence`, ...) are refused. `interval` is the time over which the flow is
@@ -415,8 +411,8 @@ class FlowField:
         """
     @staticmethod
     def load(path: _Path) -> FlowField:
-        """Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or
-        FormatError for a damaged file.
+        """Reads a field (H, W) from .npz, .flo, .png (KITTI) or .pfm, flow in px/frame. OSError, or FormatError
+        for a damaged file.
         """
     def __len__(self, /) -> int: ...
     def __bool__(self, /) -> Literal[True]: ...
@@ -425,8 +421,7 @@ class FlowField:
 
 @final
 class Measurement:
-    """A quantity of a region, in each field of a stack: numbers for a single field, arrays (T,) for a
-    stack."""
+    """A quantity of a region, in each field of a stack: numbers for a single field, arrays (T,) for a stack."""
     @property
     def quantity(self) -> str:
         """Name of the quantity (no unit)."""
@@ -453,8 +448,7 @@ class Measurement:
         """"ok", "no_dominant_motion" or "too_few_sites" (no unit), str or list (T,) of them."""
     @property
     def motion(self) -> NDArray[np.float64]:
-        """The motion (u, v, u_x, v_x, u_y, v_y) at `centre`, float64 array (6,) or (T, 6), in the field's
-        units."""
+        """The motion (u, v, u_x, v_x, u_y, v_y) at `centre`, float64 array (6,) or (T, 6), in the field's units."""
     @property
     def covariance(self) -> NDArray[np.float64]:
         """Its covariance, float64 array (6, 6) or (T, 6, 6), in squares of the field's units."""
@@ -625,8 +619,8 @@ class FlowEstimator:
         simd: _Simd | None = None,
     ) -> FlowEstimator: ...
     def push(self, /, frame: _Frame, *, time: float | None = None) -> FlowField | None:
-        """Takes the next frame (H, W), in any grey unit; returns a FlowField (px/frame) once enough frames
-        have come, before that None.
+        """Takes the next frame (H, W), in any grey unit; returns a FlowField (px/frame) once enough frames have
+        come, before that None.
 
         `time`, s, is when the frame was taken, for every frame or none: fields are then per second, each by
         the time between its own frames, and not `fps`. Where a frame is missing, "coarse_to_fine"
@@ -694,8 +688,8 @@ class FlowFilter:
         """Forgets every frame (H, W): the next one starts new filters."""
     @property
     def state(self) -> NDArray[np.float64] | None:
-        """Means q of the filters, float64 array (H, W, 12) or (N, 12), in 8-bit grey levels, px and frames;
-        NaN where there is no filter (border, mask).
+        """Means q of the filters, float64 array (H, W, 12) or (N, 12), in 8-bit grey levels, px and frames; NaN
+        where there is no filter (border, mask).
 
         None before the first frame.
         """
@@ -710,8 +704,7 @@ class FlowFilter:
         """How many frames have been taken in (a count, no unit)."""
     @property
     def repairs(self) -> int:
-        """How often a site's covariance had lost its positive definiteness and was repaired (a count, no
-        unit)."""
+        """How often a site's covariance had lost its positive definiteness and was repaired (a count, no unit)."""
     @property
     def options(self) -> dict[str, Any]:
         """The options as a dictionary, in the units of the constructor."""
@@ -752,8 +745,8 @@ def quantise(frame: _Frame, step: float | None = None) -> _Floats:
     """
 
 def luminance(frame: _Frame) -> NDArray[Any]:
-    """Luma 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601) of a colour frame (H, W, 3 or 4) in the order red,
-    green, blue; alpha is left out.
+    """Luma 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601) of a colour frame (H, W, 3 or 4) in the order red, green,
+    blue; alpha is left out.
 
     Returns a new array (H, W) of the same dtype and grey levels; integers are rounded. A grey frame (H, W) is
     copied.
@@ -769,8 +762,8 @@ def corners(
     existing: ArrayLike | None = None,
     threads: int | None = None,
 ) -> NDArray[np.float64]:
-    """Corners of `frame` (H, W): pixels whose surroundings change brightness along both axes (J. Shi, C.
-    Tomasi, "Good features to track", 1994).
+    """Corners of `frame` (H, W): pixels whose surroundings change brightness along both axes (J. Shi, C. Tomasi,
+    "Good features to track", 1994).
 
     The score is the smaller eigenvalue of the mean of (Ix^2, Ix Iy; Ix Iy, Iy^2) over `window` x `window` px
     (odd). A corner scores at least `quality` (0 to 1) times the best of the frame and no less than its 8
@@ -850,8 +843,8 @@ class GaussianFilter:
     def R(self, value: ArrayLike, /) -> None: ...
     @property
     def y(self) -> NDArray[np.float64]:
-        """Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where a
-        component was missing, as in S and K."""
+        """Residual of the last update, array (m,) or (B, m), in the measurement's units; zero where a component
+        was missing, as in S and K."""
     @property
     def S(self) -> NDArray[np.float64]:
         """Covariance of the residual, array (m, m) or (B, m, m), in the measurement's units squared."""
@@ -860,8 +853,8 @@ class GaussianFilter:
         """Gain of the last update, array (n, m) or (B, n, m), state units per measurement unit."""
     @property
     def log_likelihood(self) -> NDArray[np.float64]:
-        """Logarithm of the likelihood of the last measurement's components that were there, array () or (B,),
-        no unit; zero without any."""
+        """Logarithm of the likelihood of the last measurement's components that were there, array () or (B,), no
+        unit; zero without any."""
     @property
     def mahalanobis(self) -> NDArray[np.float64]:
         """Mahalanobis distance sqrt(y^T S^-1 y) of the last measurement, array () or (B,), in standard
@@ -930,8 +923,7 @@ class KalmanFilter(GaussianFilter):
     @H.setter
     def H(self, value: ArrayLike, /) -> None: ...
     def predict(self, /, *, F: ArrayLike | None = None, Q: ArrayLike | None = None) -> None:
-        """x <- F x, P <- F P F^T + Q. `F` (n, n) or (B, n, n) and `Q` replace the attributes for this
-        step."""
+        """x <- F x, P <- F P F^T + Q. `F` (n, n) or (B, n, n) and `Q` replace the attributes for this step."""
     def update(self, /, z: ArrayLike | None, R: ArrayLike | None = None, H: ArrayLike | None = None) -> None:
         """Takes in the measurement `z` (m,) or (B, m), in the measurement's units: the components that are
         neither NaN nor masked. None means that all are missing.
@@ -1137,8 +1129,8 @@ class ParticleFilter:
         """
     @property
     def effective_sample_size(self) -> NDArray[np.float64]:
-        """Effective sample size 1 / sum w^2 (Kong, Liu and Wong 1994), array () or (B,), a number of
-        particles from 1 to N, no unit.
+        """Effective sample size 1 / sum w^2 (Kong, Liu and Wong 1994), array () or (B,), a number of particles
+        from 1 to N, no unit.
         """
     @property
     def log_evidence(self) -> NDArray[np.float64]:
@@ -1150,8 +1142,8 @@ class ParticleFilter:
         """Sum of `log_evidence` over the accepted updates, array () or (B,), no unit."""
     @property
     def degenerate(self) -> NDArray[np.int64]:
-        """Number of updates refused because no particle had a likelihood above zero, array () or (B,) (a
-        count, no unit).
+        """Number of updates refused because no particle had a likelihood above zero, array () or (B,) (a count,
+        no unit).
         """
     @property
     def ids(self) -> NDArray[np.uint64]:
@@ -1175,9 +1167,9 @@ class ParticleFilter:
         The smallest value at which the cumulative weight is at least q, numpy's method "inverted_cdf".
         """
     def sample_gaussian(self, /, mean: ArrayLike, covariance: ArrayLike) -> None:
-        """Replaces the particles by samples of the Gaussian with `mean` (n,) or (B, n) and `covariance` (n,
-        n) or (B, n, n), in the state's units, and makes the weights equal. A number for `covariance` means
-        that multiple of the identity.
+        """Replaces the particles by samples of the Gaussian with `mean` (n,) or (B, n) and `covariance` (n, n)
+        or (B, n, n), in the state's units, and makes the weights equal. A number for `covariance` means that
+        multiple of the identity.
         """
     def predict(
         self, /, transition: _Particles | None = None, *, F: ArrayLike | None = None, Q: ArrayLike | None = None
@@ -1190,8 +1182,7 @@ class ParticleFilter:
         results that are not finite. On exceptions the filter is as before.
         """
     def standard_normal(self, /) -> NDArray[np.float64]:
-        """The standard normals of which the next prediction's noise is made, array (N, n) or (B, N, n), no
-        unit."""
+        """The standard normals of which the next prediction's noise is made, array (N, n) or (B, N, n), no unit."""
     def update(self, /, log_likelihood: _Particles | ArrayLike) -> None:
         """Multiplies the weights by the measurement's likelihood.
 
@@ -1208,8 +1199,8 @@ class ParticleFilter:
         threshold: float | None = None,
         n_particles: int | None = None,
     ) -> NDArray[np.bool_]:
-        """Copies particles in proportion to their weights, which are equal afterwards; returns whether, array
-        () or (B,) of bool, no unit.
+        """Copies particles in proportion to their weights, which are equal afterwards; returns whether, array ()
+        or (B,) of bool, no unit.
 
         `scheme` is "systematic", "stratified", "residual" or "multinomial" (Douc, Cappe and Moulines 2005).
         With a `threshold` in [0, 1] only filters whose effective sample size is below `threshold` N are
@@ -1370,20 +1361,18 @@ class Scene:
     def origin(self) -> tuple[float, float]:
         """Scene point (x, y) of pixel (0, 0), px."""
     def frame(self, /, t: float) -> NDArray[np.float64]:
-        """The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither
-        rounded nor clipped.
+        """The frame of time `t` (frames): float64 array (H, W), grey levels of an 8-bit scale, neither rounded
+        nor clipped.
 
         ValueError for a time that is not finite, or beyond the paths that the scene follows: 1e5 steps, which
         are 25000 frames or fewer in the scenes whose paths are integrated.
         """
     def frames(self, /, count: int, start: float = 0.0) -> NDArray[np.float64]:
-        """Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit
-        scale.
+        """Frames of the times start, start + 1, ...: float64 array (count, H, W), grey levels of an 8-bit scale.
         ValueError for times that `frame` refuses.
         """
     def truth(self, /, t: float, *, between: tuple[float, float] | None = None) -> FlowField:
-        """Exact flow and Jacobian of the frame of time `t` (frames), a FlowField (H, W) in px/frame and
-        1/frame.
+        """Exact flow and Jacobian of the frame of time `t` (frames), a FlowField (H, W) in px/frame and 1/frame.
 
         Without `between` the velocity at that time. With `between=(a, b)`, frames, the mean velocity between
         the times t + a and t + b of the matter that is at each pixel at time t, `(d(b) - d(a)) / (b - a)` for
@@ -1393,8 +1382,8 @@ class Scene:
         `displacement` refuses.
         """
     def motion(self, /, x: float, y: float, t: float) -> NDArray[np.float64] | None:
-        """Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and
-        1/frame, array (6,); None without truth. ValueError for a number that is not finite.
+        """Exact (u, v, u_x, v_x, u_y, v_y) at scene point (x, y) px and time t (frames), px/frame and 1/frame,
+        array (6,); None without truth. ValueError for a number that is not finite.
         """
     def displacement(self, /, x: float, y: float, t: float, duration: float = 1.0) -> tuple[float, float] | None:
         """How far (x, y) px the matter at scene point (x, y) px and time t has gone `duration` frames later;
@@ -1409,8 +1398,8 @@ class Scene:
 
 @final
 class TargetScene:
-    """A colour scene of people or cars that look alike, cross and hide each other before a moving camera,
-    with exact boxes.
+    """A colour scene of people or cars that look alike, cross and hide each other before a moving camera, with
+    exact boxes.
 
     `name` is one of `scenes.target_scenes()`. `random_state` chooses the recording: world, texture, gait,
     shake and noise. `scale` multiplies all lengths; at 1 a frame has 720 x 480 px. `noise` is the standard
@@ -1489,8 +1478,8 @@ class Sensor:
         The noise depends on the seed, `index` (which frame it is) and the pixel, on nothing else.
         """
     def apply_u8(self, /, frame: _Frame, index: int = 0) -> NDArray[np.uint8]:
-        """As `apply`, as a uint8 array (H, W) of grey levels; fractions are cut off and values outside 0 ...
-        255 clipped.
+        """As `apply`, as a uint8 array (H, W) of grey levels; fractions are cut off and values outside 0 ... 255
+        clipped.
         """
     def __eq__(self, other: object, /) -> bool: ...
     def __hash__(self, /) -> int: ...

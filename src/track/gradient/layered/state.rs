@@ -13,8 +13,8 @@ use crate::types::{Frame, TargetBox};
 /// Around the box, the scene may be hidden: share of its sides, and px. Limbs and what else is not in the
 /// support must not be learned as background, for the target would look like that a moment later.
 const HIDES: (f64, f64) = (0.1, 4.0);
-/// Deviation of the middle of the learned support from that of the target, px: it stays from frame to frame,
-/// and no filter takes it away.
+/// Standard deviation of the middle of the learned support about that of the target, px: it stays from frame
+/// to frame, and no filter takes it away.
 const OUTLINE: f64 = 0.07;
 /// What noise adds to the deviation of the middle, over noise by contrast, px: what is learned of an edge
 /// from noisy frames stays wrong for as long as it is remembered.
