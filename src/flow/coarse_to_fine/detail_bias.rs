@@ -13,7 +13,7 @@
 //! (small or curved objects). The flow moves by a share of the smoothed frames' remainder, since the finest
 //! detail may be biased; the covariance includes the mean square of the remainder of the frames as they are.
 
-use super::data_term::{DataOptions, DataTerm, MEANS};
+use super::data_term::{DataOptions, DataTerm, MEANS, Sums};
 use super::descent::DescentPlan;
 use super::nodes::{NodeAxis, binomial_mean, sites_around};
 use super::planes::{LEFT, Planes};
@@ -95,7 +95,7 @@ impl DetailBias {
         let smooth_std = residual_std.map(|std| T::from_f64(SMOOTHED_NOISE * std.to_f64()));
         let mut sums = [(&level.splines, residual_std), (&smoothed, smooth_std)].map(|(splines, std)| {
             let views = level.views_of(splines, ComparedFrames::All);
-            term.linearise_remainder(level.size, &views, motion, std, &mut data);
+            term.linearise(Sums::Means, (level.size, &views), motion, std, &mut data);
             node_sums(plan.simd, &data, size)
         });
         smoothed.into_iter().map(Spline::into_memory).for_each(|memory| space.keep(Planes::of_samples(memory)));

@@ -15,10 +15,11 @@ const TILE: usize = 320;
 
 /// What a band sums up in the windows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Sums {
-    /// Moments of the products, for the whole motion.
+pub(in super::super) enum Sums {
+    /// The [`COUNT`](super::COUNT) planes of moments of the products, for the whole motion.
     Moments,
-    /// Means of the products, for the flow that the motion leaves.
+    /// The [`MEANS`] planes of their means, of normal equations for the flow that the motion leaves: `P_uu`,
+    /// `P_uv`, `P_vv`, `q_u`, `q_v` and `e`, where `q` has `-R` on its right side.
     Means,
 }
 

@@ -39,7 +39,8 @@ use crate::image::Spline;
 use crate::parallel;
 use crate::simd::{Level, SimdReal, dispatch};
 use crate::types::Mask;
-use band::{Band, Sums, Task};
+pub(super) use band::Sums;
+use band::{Band, Task};
 use moments::taps;
 use scratch::Scratch;
 use std::sync::{Mutex, PoisonError};
@@ -136,34 +137,10 @@ impl<'a, T: SimdReal> DataTerm<'a, T> {
         Self { level, options, taps: taps(options.sigma), pool }
     }
 
-    /// Writes the [`COUNT`] planes of moments of a level to `out`; returns `|R|` of a subsample. `motion`:
-    /// finite, px of this level per frame. `scale`: standard deviation of `R` at constant brightness; without
-    /// it all weights are 1. Bit-identical for any number of threads, in the caller's thread pool.
+    /// Writes the `sums` of a level to `out`; returns `|R|` of a subsample. `motion`: finite, px of this
+    /// level per frame. `scale`: standard deviation of `R` at constant brightness; without it all weights are
+    /// 1. Bit-identical for any number of threads, in the caller's thread pool.
     pub fn linearise(
-        &self,
-        size: (usize, usize),
-        views: &[View<'_, T>],
-        motion: &Planes<T>,
-        scale: Option<T>,
-        out: &mut Planes<T>,
-    ) -> Vec<T> {
-        self.sum(Sums::Moments, (size, views), motion, scale, out)
-    }
-
-    /// The [`MEANS`] planes of the normal equations for the flow that the motion leaves: the windows' means
-    /// of `P_uu`, `P_uv`, `P_vv`, `q_u`, `q_v` and `e`, where `q` has `-R` on its right side.
-    pub fn linearise_remainder(
-        &self,
-        size: (usize, usize),
-        views: &[View<'_, T>],
-        motion: &Planes<T>,
-        scale: Option<T>,
-        out: &mut Planes<T>,
-    ) {
-        self.sum(Sums::Means, (size, views), motion, scale, out);
-    }
-
-    fn sum(
         &self,
         sums: Sums,
         (size, views): ((usize, usize), &[View<'_, T>]),

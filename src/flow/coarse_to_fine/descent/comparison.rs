@@ -1,7 +1,7 @@
 //! Compares two motions between the same frames; each site takes the one with less residual energy.
 
 use crate::flow::coarse_to_fine::data_term::{
-    COUNT, DataOptions, DataTerm, ERROR, MIN_USABLE_SHARE, MOTION, Pool, VALID,
+    COUNT, DataOptions, DataTerm, ERROR, MIN_USABLE_SHARE, MOTION, Pool, Sums, VALID,
 };
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::Planes;
@@ -68,7 +68,8 @@ impl<T: SimdReal> Comparison<'_, T> {
     fn residual_energies(&self, motion: &Planes<T>) -> Vec<f64> {
         let mut data = self.space.planes(motion.width, motion.height, COUNT);
         let term = DataTerm::new(self.simd, DataOptions::default(), self.pool);
-        term.linearise(self.level.size, &self.level.views(self.compared), motion, self.residual_std, &mut data);
+        let views = self.level.views(self.compared);
+        term.linearise(Sums::Moments, (self.level.size, &views), motion, self.residual_std, &mut data);
         let energy = |(error, usable): (&T, &T)| {
             let usable = usable.to_f64();
             if usable >= MIN_USABLE_SHARE { error.to_f64() / usable } else { f64::NAN }

@@ -7,7 +7,7 @@ use super::continuation::continue_motion;
 use super::weighted_median::{BrightnessStd, sharpen_boundaries};
 use crate::ablation::keeps;
 use crate::flow::coarse_to_fine::brightness_scale::MIN_RESIDUAL_SHARE;
-use crate::flow::coarse_to_fine::data_term::{DataTerm, MOTION, Pool};
+use crate::flow::coarse_to_fine::data_term::{DataTerm, MOTION, Pool, Sums};
 use crate::flow::coarse_to_fine::plane_pool::PlanePool;
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::pyramid::{ComparedFrames, PyramidLevel};
@@ -137,7 +137,7 @@ impl<T: SimdReal> Iteration<'_, T> {
     ) -> f64 {
         checkpoint();
         let views = level.views(self.compared);
-        let residuals = self.term.linearise(level.size, &views, motion, self.residual_std, self.data);
+        let residuals = self.term.linearise(Sums::Moments, (level.size, &views), motion, self.residual_std, self.data);
         self.residual_std = self.residual_std(residuals);
         // On recordings the motion beyond the frame's edge is no better for it.
         let has_holes = views.iter().any(|view| view.usable.is_some());

@@ -75,9 +75,9 @@ impl Case {
         let scale = self.scale.map(T::from_f64);
         Threads::new(Some(threads)).unwrap().install(|| {
             // Twice, so that content left in memory is seen to do no harm.
-            term.linearise(self.size, &views, &motion, scale, &mut out);
-            let residuals = term.linearise(self.size, &views, &motion, scale, &mut out);
-            term.linearise_remainder(self.size, &views, &motion, scale, &mut means);
+            term.linearise(Sums::Moments, (self.size, &views), &motion, scale, &mut out);
+            let residuals = term.linearise(Sums::Moments, (self.size, &views), &motion, scale, &mut out);
+            term.linearise(Sums::Means, (self.size, &views), &motion, scale, &mut means);
             (out, means, residuals)
         })
     }
