@@ -1643,7 +1643,7 @@ def _motion3d_estimate_field(
     field: FlowField, intrinsics: ArrayLike | None, layout: dict[str, Any], options: dict[str, Any]
 ) -> tuple[dict[str, Any], NDArray[np.float64]]: ...
 def _motion3d_field_points(
-    field: FlowField, spacing: float | None, most: int | None, region: Sequence[int] | None
+    field: FlowField, spacing: float | None, max_points: int | None, region: Sequence[int] | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], list[float]]: ...
 def _motion3d_focus(
     translation: ArrayLike, tangent: ArrayLike, covariance: ArrayLike, intrinsics: ArrayLike | None

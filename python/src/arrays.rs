@@ -137,8 +137,8 @@ pub fn tracked_frame(
     converted(argument, unmasked(argument, object, levels)?, colour)
 }
 
-/// The array, masked or not; masked bool, uint8 and uint16 become float32 with the white that `levels` take
-/// floats to have.
+/// The array, masked or not; bool, and masked uint8 and uint16, become float32 with the white that `levels`
+/// take floats to have.
 pub fn unmasked<'py>(
     argument: &str,
     object: &Bound<'py, PyAny>,
@@ -146,11 +146,12 @@ pub fn unmasked<'py>(
 ) -> Outcome<Bound<'py, PyUntypedArray>> {
     let array = native(argument, object)?;
     let white = match dtype_name(&array).as_str() {
-        "bool" | "uint8" => f32::from(u8::MAX),
+        "bool" => 1.0,
+        "uint8" => f32::from(u8::MAX),
         "uint16" => f32::from(u16::MAX),
         _ => return Ok(array),
     };
-    if !is_masked(&array)? {
+    if white > 1.0 && !is_masked(&array)? {
         return Ok(array);
     }
     let white_of_floats = f32::from(u8::MAX) / levels.float_gain() as f32;

@@ -1,5 +1,5 @@
 //! Ctrl-C: the first stops the run after the current frame, the second ends the process at once. So does the
-//! first one while the input is opened, which a pipe may never end.
+//! first one while inputs are opened, which a pipe may never end.
 
 use crate::error::{Error, Result};
 use crate::io::write::remove_temporaries;
@@ -11,8 +11,8 @@ pub const EXIT_INTERRUPTED: i32 = 130;
 
 static STOP_REQUESTED: AtomicBool = AtomicBool::new(false);
 static RUNNING: AtomicUsize = AtomicUsize::new(0);
-/// Whether a command has its first frame.
-static HAS_FRAMES: AtomicBool = AtomicBool::new(false);
+/// Whether a command has opened its inputs.
+static HAS_INPUTS: AtomicBool = AtomicBool::new(false);
 
 /// Held while a command runs: from [`start_work`] on, a signal sets a flag instead of ending the process.
 #[derive(Debug)]
@@ -26,7 +26,7 @@ impl Watch {
         HANDLER.call_once(|| drop(ctrlc::set_handler(on_signal)));
         if RUNNING.fetch_add(1, Ordering::SeqCst) == 0 {
             STOP_REQUESTED.store(false, Ordering::SeqCst);
-            HAS_FRAMES.store(false, Ordering::SeqCst);
+            HAS_INPUTS.store(false, Ordering::SeqCst);
         }
         Self(())
     }
@@ -44,14 +44,14 @@ impl Drop for Watch {
     }
 }
 
-/// Called once the first frame is read, or is about to be computed: there is something to finish now.
+/// Called once all inputs are open: there is something to finish now.
 pub fn start_work() {
-    HAS_FRAMES.store(true, Ordering::SeqCst);
+    HAS_INPUTS.store(true, Ordering::SeqCst);
 }
 
 fn on_signal() {
     let again = STOP_REQUESTED.swap(true, Ordering::SeqCst);
-    if again || RUNNING.load(Ordering::SeqCst) == 0 || !HAS_FRAMES.load(Ordering::SeqCst) {
+    if again || RUNNING.load(Ordering::SeqCst) == 0 || !HAS_INPUTS.load(Ordering::SeqCst) {
         let _no_new_ones = remove_temporaries();
         std::process::exit(EXIT_INTERRUPTED);
     }

@@ -36,7 +36,7 @@ use std::ffi::OsString;
 #[command(name = "jacoflow", version, propagate_version = true, max_term_width = 110)]
 #[command(
     after_help = "Exit codes: 0 success, 1 run-time failure, 2 unusable argument, 3 missing program, 130 interrupted.\n\
-    Ctrl-C ends the run after the current frame, or at once before the first frame is read. A second Ctrl-C always ends it at once.\n\
+    Ctrl-C ends the run after the current frame, or at once while inputs are opened. A second Ctrl-C always ends it at once.\n\
     Environment: JACOFLOW_THREADS (number of threads), JACOFLOW_SIMD (scalar, avx2, avx512).\n\n\
     Examples:\n  \
     jacoflow demo -o demo\n  \

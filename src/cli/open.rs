@@ -1,7 +1,6 @@
 //! From input arguments to a source, and what is known about it before the run.
 
 use super::arguments::{ComputeArguments, InputArguments, MethodArguments, UnitArguments};
-use super::interrupt::start_work;
 use crate::error::{Error, Result};
 use crate::flow::InitialFlow;
 use crate::image::{GaussianSmoother, Preprocess, Quantiser};
@@ -58,6 +57,11 @@ pub fn open_for_method(arguments: &InputArguments, method: &MethodArguments) -> 
     match &arguments.input[..] {
         [first, second] if method.pairs => {
             let selection = arguments.selection.options();
+            if selection.start % 2 == 1 || selection.step != 1 {
+                let expected = "an even start and step 1 with two inputs, whose frames alternate";
+                let got = format!("start {}, step {}", selection.start, selection.step);
+                return Err(Error::argument("start", expected, got));
+            }
             let whole = OpenOptions { start: 0, stop: None, step: 1, ..selection };
             let both = DoubleFrames::new(open(first, &whole)?, open(second, &whole)?)?;
             looked_at(Box::new(Selected::new(both, &selection)?), arguments)
@@ -84,7 +88,6 @@ fn looked_at<F: FrameFormat>(source: Box<dyn FrameSource<F>>, arguments: &InputA
     let has_own_rate = arguments.fps.is_none() && rate.is_some();
     let (first, source) = peek(source)?;
     let first = first.ok_or_else(|| Error::argument("input", "at least one frame", format!("none in {name}")))?;
-    start_work();
     Ok(Opened { source, first, frames, numbering, has_own_rate, pixel_size, name })
 }
 

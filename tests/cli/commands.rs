@@ -246,6 +246,14 @@ fn double_frames_may_lie_in_two_inputs() {
     // Two stacks; the frames are counted as if they lay in one.
     place.good("flow A.npy B.npy --pairs --start 2 --stop 6 -o out");
     assert_eq!(place.names("out"), ["000002.npz", "000004.npz"]);
+    for chosen in ["--start 1", "--step 2"] {
+        let refused = place.line(&format!("flow A.npy B.npy --pairs {chosen} -o other"));
+        assert!(
+            refused.code == 2 && refused.err.contains("an even start and step 1 with two inputs"),
+            "{}",
+            refused.err
+        );
+    }
     // The rate of the files counts pairs, and says nothing of the time within them.
     let rate = place.good("flow A.y4m B.y4m --pairs --json");
     assert_eq!((&rate.json()["fps"], rate.json()["fields"].as_u64()), (&serde_json::Value::Null, Some(8)));

@@ -226,6 +226,31 @@ fn the_first_interrupt_ends_the_opening_of_a_silent_pipe() {
     }
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn the_first_interrupt_ends_the_opening_of_what_is_read_beside_the_frames() {
+    for line in [
+        "flow s.npy --mask pipe.png -o out.npz",
+        "flow s.npy --points pipe.csv -o out.csv",
+        "flow s.npy --initial pipe.flo -o out.npz",
+        "track s.npy --method particle --boxes pipe.csv -o out.csv",
+        "filter s.npy --resume pipe.npz -o out.npz",
+    ] {
+        let place = Place::new();
+        place.good("synth affine -o s.npy --frames 3 --size 48x40");
+        let pipe = line.split(' ').find(|word| word.starts_with("pipe")).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(place.path(pipe)).status().unwrap().success());
+        let mut child = start(&place, line);
+        wait_for_handlers(&child);
+        // The frames come first.
+        std::thread::sleep(std::time::Duration::from_millis(300));
+        interrupt(&child);
+        wait_until(line, || child.try_wait().unwrap().is_some());
+        assert_eq!(child.wait().unwrap().code(), Some(130), "{line}");
+        assert_eq!(place.names("."), [pipe, "s.npy"], "{line}");
+    }
+}
+
 #[test]
 fn rows_on_standard_output_come_frame_by_frame_and_a_closed_pipe_ends_quietly() {
     // Few rows a frame, which are flushed; and more than any buffer holds.

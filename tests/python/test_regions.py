@@ -150,6 +150,17 @@ def test_noise_as_strong_as_the_texture_does_not_make_frames_unrelated():
         assert field.valid.mean() > 0.7 and abs(measured.value - 2) < 3 * measured.std
 
 
+@pytest.mark.parametrize("dtype", ["uint8", "float32", "float64"])
+def test_a_blank_wall_beside_moving_texture_is_not_sure_of_its_motion(dtype):
+    for seed in range(4):
+        first, second = (moved(texture(seed), np.eye(2), (4.0 * k, 0.0)) for k in range(2))
+        for frame in (first, second):
+            frame[:, 90:] = 25.0
+        frames = [np.rint(frame).astype(np.uint8) if dtype == "uint8" else (frame / 255).astype(dtype) for frame in (first, second)]
+        found = jacoflow.flow(*frames).measure("u", region=(110, 40, 40, 80))
+        assert not abs(found.value) > 4 * found.std, (seed, found)
+
+
 def test_what_the_frames_contradict_does_not_make_the_rest_dominant():
     # Still, moving, and unrelated: the still part is most of what is valid, and not most of the region.
     columns = np.arange(SIZE)

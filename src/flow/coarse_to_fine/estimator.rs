@@ -99,7 +99,10 @@ impl CoarseToFine {
                 equalize_along(simd, compared, (&views, brightness), &coarse.motion, (pixel, equalized.is_some()));
             measurements += 1;
             let noise_gain = equalized.as_ref().map_or(1.0, |equalized| equalized.noise_gain);
-            let Some(again) = again.filter(|_| measurements < MAX_MEASUREMENTS) else {
+            // To equalise frames without contrast would make texture of their rounding.
+            let has_contrast = |frame: &&Frame<T>| BrightnessScale::of(&[*frame], mask).contrast > 0.0;
+            let again = again.filter(|_| measurements < MAX_MEASUREMENTS && frames.iter().all(has_contrast));
+            let Some(again) = again else {
                 return (plan, coarse, noise_gain);
             };
             coarse.recycle(&workspace.space);

@@ -2,6 +2,7 @@
 
 mod consistency;
 
+use super::brightness_scale::BrightnessScale;
 use super::covariance::{CovarianceMap, CovarianceMaps, Energy, covariance};
 use super::data_term::{DataOptions, ENERGY, MOTION, SEEN, UU, UV, VV, View};
 use super::estimate::Estimate;
@@ -45,11 +46,26 @@ pub(super) fn covariance_of<T: SimdReal>(
     };
     let noise = match common.noise {
         Some(sigma) => Energy::Known(energy_of(sigma * sigma)),
-        // Rounding is the minimum noise of integer samples.
-        None => Energy::AtLeast(energy_of(if are_rounded(frames) { 1.0 / 12.0 } else { 0.0 })),
+        None => Energy::AtLeast(energy_of(rounding_variance(&estimate.brightness, frames))),
     };
     covariance(common.level(), estimate, noise, frames.len() == 2, common.systematic)
 }
+
+/// Variance of rounding, the minimum noise: of integers to grey levels, of other samples to the precision
+/// they are computed in.
+fn rounding_variance<T: SimdReal>(brightness: &BrightnessScale, frames: &[&Frame<T>]) -> f64 {
+    if are_rounded(frames) {
+        return 1.0 / 12.0;
+    }
+    let relative = if size_of::<T>() < size_of::<f64>() { f64::from(f32::EPSILON) } else { f64::EPSILON };
+    let largest = brightness.mean.abs() + LARGEST_DEVIATION * brightness.contrast / brightness.gain;
+    (OPERATIONS * relative * largest).powi(2)
+}
+
+/// Brightness that samples reach, standard deviations from the mean; and errors, in units of the precision,
+/// that splines add to that of a sample.
+const LARGEST_DEVIATION: f64 = 4.0;
+const OPERATIONS: f64 = 2.0;
 
 /// Writes the estimate and its covariance at the field's sites, a pair's at the first frame.
 pub(super) fn fill<T: SimdReal>(
