@@ -23,11 +23,13 @@ fn grey_levels<const N: usize>(views: [(&str, &Bound<'_, PyAny>); N]) -> Outcome
         if given == frame.dtype() {
             levels = levels.revised(std::slice::from_ref(&frame));
         }
-        frames.push((frame, given));
+        let is_bool = arrays::dtype_name(&arrays::native(name, view)?) == "bool";
+        frames.push((frame, if is_bool { "bool" } else { given }));
     }
     Ok(std::array::from_fn(|i| {
         let (frame, given) = &frames[i];
         let gain = match *given {
+            "bool" => 255.0,
             u8::DTYPE => 1.0,
             u16::DTYPE => 1.0 / 257.0,
             _ => levels.float_gain(),

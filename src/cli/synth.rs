@@ -243,9 +243,14 @@ impl SynthCommand {
             let mut truth_files = formats.iter().filter_map(|format| self.truth_files(*format));
             truth_files.try_for_each(|files| files.clear_except(|index| index < done))
         })();
-        // One file appears whole or not at all; of a folder what was complete stays.
-        let kept = if result.is_err() && !is_folder(output) { 0 } else { done };
-        (kept, result)
+        if result.is_ok() {
+            return (done, result);
+        }
+        // Frames appear all or none, and so does their truth.
+        for files in formats.iter().filter_map(|format| self.truth_files(*format)) {
+            let _beside_the_first_error = files.clear_except(|index| index > done);
+        }
+        (0, result)
     }
 
     /// The frame as the camera delivers it.

@@ -226,6 +226,20 @@ fn the_first_interrupt_ends_the_opening_of_a_silent_pipe() {
     }
 }
 
+#[test]
+fn an_interrupted_scene_says_that_nothing_is_left_of_it() {
+    let place = Place::new();
+    let mut child = start(&place, "synth vortex -o frames/ --truth truth --frames 3000 --size 96x96");
+    wait_until("truth of a frame", || place.path("truth/000001.npz").exists());
+    interrupt(&child);
+    wait_until("the end", || child.try_wait().unwrap().is_some());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let mut said = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+    assert!(said.contains("0 of 3000 frames written"), "{said}");
+    assert!(place.names(".").is_empty());
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn the_first_interrupt_ends_the_opening_of_what_is_read_beside_the_frames() {
@@ -233,7 +247,6 @@ fn the_first_interrupt_ends_the_opening_of_what_is_read_beside_the_frames() {
         "flow s.npy --mask pipe.png -o out.npz",
         "flow s.npy --points pipe.csv -o out.csv",
         "flow s.npy --initial pipe.flo -o out.npz",
-        "track s.npy --method particle --boxes pipe.csv -o out.csv",
         "filter s.npy --resume pipe.npz -o out.npz",
     ] {
         let place = Place::new();

@@ -276,9 +276,12 @@ fn constant_frames_are_unobservable_and_small_ones_no_error() {
     let field = estimate(CoarseToFineOptions::pair(), EstimatorOptions::default(), &flat);
     assert!(field.status.iter().all(|s| *s == Status::Unobservable) && field.motion.iter().all(|v| v.is_nan()));
     // Frames of different brightness are not brought to each other: their rounding would become texture.
-    for values in [&[10.0_f32, 60.0, 120.0][..], &[0.2, 0.7, 0.4], &[0.1, 0.3]] {
+    let (pair, triple) = (CoarseToFineOptions::pair, CoarseToFineOptions::default);
+    for (options, values) in
+        [(triple(), &[10.0_f32, 60.0, 120.0][..]), (triple(), &[0.2, 0.7, 0.4]), (pair(), &[0.1, 0.3])]
+    {
         let flat: Vec<Frame<f32>> = values.iter().map(|value| Frame::filled(96, 96, *value)).collect();
-        let field = estimate(CoarseToFineOptions::default(), EstimatorOptions::default(), &flat);
+        let field = estimate(options, EstimatorOptions::default(), &flat);
         assert!(field.status.iter().all(|s| *s == Status::Unobservable), "{values:?}");
     }
     let tiny: Vec<Frame<f32>> = (0..2).map(|t| Frame::from_fn(3, 4, |x, y| ((x * y + t) as f32).sin())).collect();

@@ -139,6 +139,19 @@ def test_masked_pixels_are_nan_in_other_functions(call, unit, dtype):
         assert_array_equal(got, want)
 
 
+def test_booleans_are_black_and_white_where_grey_levels_count():
+    silhouettes = np.zeros((6, 140, 160), bool)
+    for k, frame in enumerate(silhouettes):
+        frame[60:90, 40 + 3 * k : 64 + 3 * k] = True
+    for same in (lambda frames: frames.astype(float), lambda frames: frames.astype(np.uint8) * 255):
+        one, other = (
+            jacoflow.track.track(list(frames), bbox=(40, 60, 24, 30)) for frames in (silhouettes, same(silhouettes))
+        )
+        assert_array_equal(one.position, other.position)
+        edges = jacoflow.stereo.edge_pixels(silhouettes[0])
+        assert len(edges[0]) and np.array_equal(edges, jacoflow.stereo.edge_pixels(same(silhouettes)[0]))
+
+
 def test_masked_values_have_no_part_in_means():
     labels, values = np.array([[0, 0, 1]]), np.ma.array([[1, 2, 3]], mask=[[False, True, True]])
     assert_array_equal(jacoflow.segment.region_means(labels, values), [1.0, np.nan])
