@@ -1,7 +1,7 @@
 """A camera's own motion: where it heads, how it turns, how far everything is, and what moves by itself.
 
 Flow at 400 points of a scene in depth is measured with 0.3 px of noise; a fifth of the points lie on
-something that moves by itself. Before anything is measured the bound tells how many points the direction
+something that moves by itself. Before anything is measured the bound says how many points the direction
 needs.
 """
 

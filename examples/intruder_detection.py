@@ -1,4 +1,4 @@
-"""Intruder detection: something moves where nothing should, told from camera noise by the flow's own
+"""Intruder detection: something moves where nothing should, separated from camera noise by the flow's own
 covariance.
 
 A fixed camera looks at a yard. From frame 6 on a person-sized patch walks through it. In every frame each

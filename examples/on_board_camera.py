@@ -2,7 +2,7 @@
 
 A camera drives towards a far background. Ahead of it are a car that it closes in on, a car that has overtaken
 and draws away, and one that crosses the road. Three frames are enough: a thing's divergence is 2 / (time to
-contact), whatever its own movement across the picture, and the point that stands still in the background is
+contact), for any movement of its own across the picture, and the point that stands still in the background is
 where the camera is heading.
 """
 

@@ -219,7 +219,7 @@ impl SynthCommand {
         threads: Threads,
         bar: &Bar<'_>,
     ) -> (usize, Result<()>) {
-        let mut done = 0;
+        let (mut done, mut truths) = (0, 0);
         let result = (|| {
             let mut recording = open_sink(&output.to_string_lossy(), self.rate)?;
             if let Some(folder) = &self.truth {
@@ -234,6 +234,7 @@ impl SynthCommand {
                     for format in formats {
                         if let Some(files) = self.truth_files(*format) {
                             format.write(files.path(index), &field, "")?;
+                            truths = index + 1;
                         }
                     }
                 }
@@ -248,7 +249,7 @@ impl SynthCommand {
         }
         // Frames appear all or none, and so does their truth.
         for files in formats.iter().filter_map(|format| self.truth_files(*format)) {
-            let _beside_the_first_error = files.clear_except(|index| index > done);
+            let _beside_the_first_error = files.clear_except(|index| index >= truths);
         }
         (0, result)
     }

@@ -280,7 +280,7 @@ fn constant_frames_are_unobservable_and_small_ones_no_error() {
     for (options, values) in
         [(triple(), &[10.0_f32, 60.0, 120.0][..]), (triple(), &[0.2, 0.7, 0.4]), (pair(), &[0.1, 0.3])]
     {
-        let flat: Vec<Frame<f32>> = values.iter().map(|value| Frame::filled(96, 96, *value)).collect();
+        let flat: Vec<Frame<f32>> = values.iter().map(|value| Frame::filled(160, 160, *value)).collect();
         let field = estimate(options, EstimatorOptions::default(), &flat);
         assert!(field.status.iter().all(|s| *s == Status::Unobservable), "{values:?}");
     }

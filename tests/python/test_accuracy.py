@@ -32,7 +32,7 @@ def test_three_frames_are_four_times_as_accurate(case):
 
 @pytest.mark.parametrize("name", ["coarse to fine, balanced, pair", "coarse to fine, balanced"])
 def test_slopes_are_near_the_noise_bound_of_the_windows_they_rest_on(name):
-    """Least squares with exact gradients and nothing but noise would have the bound; what is asked of the
+    """Least squares with exact gradients and nothing but noise would have the bound; what is required of the
     mean is 1.7 times it."""
     ours = contestant(name)
     cases = [controlled.Case(64.0, 4.0, 3.0), controlled.Case(256.0, 2.0, 3.0)]

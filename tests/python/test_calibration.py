@@ -99,10 +99,10 @@ MOTIONS = {
 @pytest.mark.parametrize("frames", [2, 3])
 @pytest.mark.parametrize("carrier", ["noise", "speckle", "particles"])
 def test_intervals_of_the_coarse_to_fine_estimate_hold_the_truth(carrier, frames):
-    """95 % intervals over three motions and two noise levels together: .92 to .97 is asked. One texture has
-    few independent errors, since windows reach over 20 px, and those of pairs and of affine motion are told
-    on the wide side (benchmarks/tables/coverage.py), most of all noise textures in three frames (.99): .90 to
-    .995 is allowed here.
+    """95 % intervals over three motions and two noise levels together: .92 to .97 is required. One texture
+    has few independent errors, since windows reach over 20 px, and those of pairs and of affine motion are
+    stated on the wide side (benchmarks/tables/coverage.py), most of all noise textures in three frames (.99):
+    .90 to .995 is allowed here.
     """
     held = {name: [] for name in ("u", "v", "divergence", "curl")}
     for (motion, parameters), noise, seed in ((m, n, s) for m in MOTIONS.items() for n, s in ((1.0, 1), (3.0, 2))):
@@ -128,7 +128,7 @@ def test_intervals_of_a_small_disc_hold_its_motion():
 @pytest.mark.parametrize("frames", [2, 3])
 def test_what_leaves_the_frame_has_wide_intervals(frames):
     """Beside an edge that motion of 6 px crosses nothing is seen; a field that is continued from inside is
-    told to be so."""
+    stated to be so."""
     shares, wider = [], []
     shear = {"u": 6.0, "v": 0.5, "u_x": 0.0, "v_x": 0.0, "u_y": 0.02, "v_y": 0.0}
     motions = (("affine", shear), ("waves", {"speed": 6.0, "wavelength": 128.0}))
@@ -201,7 +201,7 @@ def flat_area(kind, width, centre):
 )
 def test_what_coarse_levels_leave_beneath_areas_without_texture_is_reported(preset, kind, width, textures, least):
     """In a scene that moves as a whole nothing bends, but only coarse levels see into flat areas. Where the
-    area lies on the grid that deviations are told at must not matter. They may be wide, but not so wide that
+    area lies on the grid that deviations are given at must not matter. They may be wide, but not so wide that
     nothing is told."""
     y, x = np.indices((256, 256)).astype(float)
     inside, rim, wide = [], [], []
@@ -259,7 +259,7 @@ def test_areas_without_texture_are_reported_as_uncertain_as_they_are(preset, lea
     """Beneath a flat patch of 50 px flow bends: it is continued from the textured sites around, and the
     intervals say how far motion departs from that. Without this they hold the truth in an eighth to three
     fifths of the patch. A bend that nothing shows outside the patch cannot be known: fewer than 95 of 100
-    intervals are asked to hold."""
+    intervals must hold."""
     y, x = np.indices((200, 200)).astype(float)
 
     def along(x):

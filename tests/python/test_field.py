@@ -100,7 +100,7 @@ def test_rotation_centre():
 @pytest.mark.parametrize(("count", "smooth", "least"), [(3, None, 0.5), (3, 1.5, 0.1), (2, None, 0.5)])
 def test_the_deviation_of_a_regions_mean_holds_its_error(count, smooth, least):
     """Neighbouring estimates share pixels: 1,600 of them are not 1,600 independent ones. Of smoothed frames
-    deviations are told on the wide side."""
+    deviations are stated on the wide side."""
     motion = dict(u=0.1, v=0.05, u_x=0.003, v_x=0.006, u_y=-0.006, v_y=0.003)
     ratios = []
     for texture in range(4):

@@ -62,8 +62,8 @@ def test_estimates_are_what_they_say(weights):
 
 
 def test_it_agrees_with_the_general_estimate():
-    """The same scene for `estimate_motion`, whose rotation is told to be none: it has one more unknown, which
-    tells nothing of the angle."""
+    """The same scene for `estimate_motion`, whose rotation is given as none: it has one more unknown, which
+    says nothing of the angle."""
     rng = np.random.default_rng(4)
     nu, seen = flow(400, 0.6, 0.02)
     rng.shuffle(seen)

@@ -33,7 +33,7 @@ def seen():
 @pytest.mark.parametrize("way", fields.WAYS)
 def test_ellipsoids_hold_as_often_as_they_say(seen, method, way):
     """Of the few of so few rooms that are ok nearly all. Errors of patches of slow, precise flow may go
-    together farther than is told."""
+    together farther than is stated."""
     row = fields.row(f"{method}, {way}", fields.estimated(seen[method], way))
     assert row["wrong"] == 0 and row["ok"] >= (ROOMS if method == "coarse_to_fine" else 1), row
     least = 0.88 if way != "patches=48" else 0.7

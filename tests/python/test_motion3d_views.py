@@ -22,7 +22,7 @@ def test_two_views_in_pixels_make_an_essential_matrix():
 
 
 def test_displacements_over_a_whole_frame_are_placed_half_way():
-    """Within half of the published figures, whose layout is not told; at the start they are larger by 20
+    """Within half of the published figures, whose layout is not given; at the start they are larger by 20
     times and more."""
     for row in claims.displacements(12):
         for what in ("start, mrad", "midpoint, deg", "midpoint, mrad"):

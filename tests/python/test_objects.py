@@ -1,5 +1,5 @@
-"""Objects with ways of their own: three frames must not tell them worse than two because they stop, start or
-turn back."""
+"""Objects with ways of their own: three frames must not be worse for them than two because they stop, start
+or turn back."""
 
 import numpy as np
 import pytest

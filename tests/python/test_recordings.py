@@ -94,7 +94,7 @@ def test_estimates_of_a_steady_flow_agree_within_their_deviations(count):
             difference = (other.value(name) - one.value(name))[inner] / np.hypot(one.std(name), other.std(name))[inner]
             within, middle = (np.abs(difference) < 1.96).mean(), np.median(np.abs(difference))
             print(f"{count} frames, {name}: {within:.3f} within 1.96 deviations, median {middle:.2f} (0.67 is exact)")
-            # Deviations of large motions are told too wide rather than too narrow.
+            # Deviations of large motions are stated too wide rather than too narrow.
             assert within > 0.85 and 0.35 < middle < 0.8
 
 

@@ -351,7 +351,7 @@ def test_what_leaves_the_picture_is_measured_while_half_of_it_is_left(mode):
             board = max(boards, key=lambda c: c.n_pixels)
             assert np.allclose(board.velocity, [16, 0, 0], atol=0.1)
             # Of its 207 edge pixels at step 4 only 102 are in the picture at step 5, less than half: it
-            # coasts, unless strays tip the scales.
+            # coasts, unless outliers decide.
             assert t == 5 or not board.coasting
         # At step 5 there are 20 px of it, at step 6 only 4: nothing can be measured between them.
         if t == 6:

@@ -1,4 +1,4 @@
-"""Small targets that go behind a bar: what is left of one at the bar's edge is not all of it, whatever its
+"""Small targets that go behind a bar: what is left of one at the bar's edge is not all of it, for every
 shape, contrast and growth."""
 
 

@@ -48,13 +48,13 @@ def test_starts_five_px_beside_the_centre_find_the_box():
 def test_stated_deviations_hold_the_centre():
     """Within two stated deviations in 95 % of frames would be right for independent errors; those of the
     learned outline stay from frame to frame. While it is being learned, in the first ten frames, its middle
-    may still move, and large targets tell so."""
+    may still move, and large targets say so."""
     held = []
     for scene in SIMULATION.values():
         found = follow(scene)
         deviations = np.sqrt(found.covariance[:, :, 0, 0])
         held.append((np.abs(found.position - scene.centres) < 2 * deviations)[1:].mean())
-        # The specification's range for targets of one size; it says itself that growing ones are told too
+        # The specification's range for targets of one size; it says itself that growing ones are stated too
         # sure of.
         assert held[-1] >= 0.92 or scene.name.startswith("S3"), scene.name
         assert deviations[5:].max() <= 0.9 and deviations[10:].max() <= 0.45, scene.name
