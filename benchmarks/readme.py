@@ -67,6 +67,7 @@ LIMITS = "Limits of a step"
 RATES = "Rates of large steps"
 UNRELATED = "Unrelated frames"
 WAVES = "Turning waves"
+COARSE = "Shifts of coarse texture"
 TWO_MOTIONS = "Two motions in a region"
 NOISE = "Noise of a pair"
 METHODS = "Turning by method"
@@ -144,9 +145,19 @@ def unrelated(record: Record) -> list[str]:
 
 def turning_waves(record: Record) -> list[str]:
     """Shares of valid and of silent sites of a texture without fine detail, by the turn."""
+    return held(record.sections[WAVES], "turn, degrees")
+
+
+def coarse_shifts(record: Record) -> list[str]:
+    """The same of texture with coarse parts, by the shift."""
+    return held(record.sections[COARSE], "shift, px")
+
+
+def held(rows: Rows, motion: str) -> list[str]:
+    """Shares of valid and of silent sites, by the motion."""
     names = ("pair, valid", "pair, silent", "triple, valid", "triple, silent")
-    body = [[number(row["turn, degrees"], 0), *(number(row.get(name), 3) for name in names)] for row in record.sections[WAVES]]
-    return lines(["turn, degrees", *names], body)
+    body = [[number(row[motion], 0), *(number(row.get(name), 3) for name in names)] for row in rows]
+    return lines([motion, *names], body)
 
 
 def two_motions(record: Record) -> list[str]:
@@ -334,6 +345,7 @@ TABLES: dict[str, tuple[Callable[[Record], list[str]], tuple[str, ...]]] = {
     "large_rates": (large_rates, (RATES,)),
     "unrelated": (unrelated, (UNRELATED,)),
     "turning_waves": (turning_waves, (WAVES,)),
+    "coarse_shifts": (coarse_shifts, (COARSE,)),
     "two_motions": (two_motions, (TWO_MOTIONS,)),
     "turning_discs": (turning_discs, (DISCS,)),
     "noise": (noise, (NOISE,)),

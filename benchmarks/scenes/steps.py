@@ -19,6 +19,15 @@ def texture(seed: int) -> Array:
     return np.asarray(20 + 200 * (noise - noise.min()) / np.ptp(noise))
 
 
+def coarse(seed: int) -> Array:
+    """Noise smoothed by 2 px and noise smoothed by 16, standard deviation 40 grey levels about 128, twice as
+    large as a frame: most of it is coarse."""
+    rng = np.random.default_rng(seed)
+    parts = [gaussian_filter(rng.standard_normal((2 * SIZE, 2 * SIZE)), sigma) for sigma in (2.0, 16.0)]
+    total = sum(part / part.std() for part in parts)
+    return np.asarray(128 + 40 * total / np.std(total))
+
+
 def waves(seed: int) -> Array:
     """A sum of 60 waves of 5 to 30 px in random directions about 128, standard deviation 25 grey levels,
     twice as large as a frame: texture without fine detail."""

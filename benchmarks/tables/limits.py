@@ -6,6 +6,8 @@ small an object, and how much noise there may be.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +19,7 @@ from benchmarks.scenes import steps
 
 Row = dict[str, object]
 TURNS, ENLARGEMENTS, SHIFTS = (5, 10, 15, 20, 30), (1.05, 1.1, 1.2, 1.3, 1.5), (8, 16, 32, 48, 64)
+COARSE_SHIFTS = (32, 48, 56, 64, 72)
 DIFFERENCES, NOISES, FRACTIONS = (0.1, 0.2, 0.3, 0.5, 1.0), (0.0, 1.0, 2.0, 4.0, 8.0, 16.0), (0.25, 0.37, 0.8)
 SEEDS = (0, 1, 2)
 RATES = {
@@ -49,10 +52,7 @@ def limits(seeds: tuple[int, ...]) -> list[Row]:
     rows: list[Row] = []
     for name, (matrix, shift) in cases().items():
         truth = steps.flow(matrix, shift)
-        y, x = np.mgrid[: steps.SIZE, : steps.SIZE]
-        ends = np.stack([x, y], axis=-1) + truth
-        inside = ((ends >= 0) & (ends < steps.SIZE)).all(axis=-1)
-        inside[:MARGIN], inside[-MARGIN:], inside[:, :MARGIN], inside[:, -MARGIN:] = (False,) * 4
+        inside = _inside(truth)
         found: dict[str, list[float]] = {}
         for seed in seeds:
             picture = steps.texture(seed)
@@ -61,11 +61,10 @@ def limits(seeds: tuple[int, ...]) -> list[Row]:
             )
             for what, field in (("pair", jacoflow.flow(first, second)), ("triple", jacoflow.flow(before, first, second))):
                 error = np.linalg.norm(field.flow - truth, axis=-1)[inside]
-                valid = field.valid[inside]
-                std = np.hypot(field.std("u"), field.std("v"))[inside]
+                valid, silent = _shares(field, truth, inside)
                 found.setdefault(f"{what}, px", []).append(float(np.nanmedian(error)))
-                found.setdefault(f"{what}, valid", []).append(float(valid.mean()))
-                found.setdefault(f"{what}, silent", []).append(float((valid & (error > 1) & (error > 5 * std)).mean()))
+                found.setdefault(f"{what}, valid", []).append(valid)
+                found.setdefault(f"{what}, silent", []).append(silent)
             if samples.cv2 is not None:
                 grey = [np.rint(frame).astype(np.uint8) for frame in (first, second)]
                 for rival, run in rivals.RIVALS.items():
@@ -127,23 +126,53 @@ def unrelated(seeds: tuple[int, ...]) -> list[Row]:
 def turning_waves(seeds: tuple[int, ...]) -> list[Row]:
     """Turns of a texture without fine detail under a grey level of noise: shares of the sites inside the
     frame that are `valid`, and of silent ones, as in `limits`."""
+    turns = {degrees: (steps.turn(np.radians(degrees)), 0.0) for degrees in TURNS[:3]}
+    return _held(steps.waves, "turn, degrees", turns, seeds)
+
+
+def coarse_shifts(seeds: tuple[int, ...]) -> list[Row]:
+    """The same of texture with coarse parts that moves by a large part of the frame."""
+    return _held(steps.coarse, "shift, px", {shift: (np.eye(2), float(shift)) for shift in COARSE_SHIFTS}, seeds)
+
+
+def _held(
+    texture: Callable[[int], NDArray[np.float64]], name: str,
+    motions: Mapping[int, tuple[NDArray[np.float64], float]], seeds: tuple[int, ...],
+) -> list[Row]:
+    """Shares of the sites that stay inside the frame that are `valid` and silent; a row for each matrix and
+    shift along x."""
     rows: list[Row] = []
-    inside = (slice(MARGIN, -MARGIN),) * 2
-    for degrees in TURNS[:3]:
-        matrix = steps.turn(np.radians(degrees))
-        truth = steps.flow(matrix)[inside]
+    for value, (matrix, shift) in motions.items():
+        truth = steps.flow(matrix, (shift, 0.0))
+        inside = _inside(truth)
         found: dict[str, list[float]] = {}
         for seed in seeds:
-            picture, rng = steps.waves(seed), np.random.default_rng(seed)
-            frames = [eight_bit(steps.moved(picture, np.linalg.matrix_power(matrix, k)), 1.0, rng) for k in (-1, 0, 1)]
+            picture, rng = texture(seed), np.random.default_rng(seed)
+            powers = [(np.linalg.matrix_power(matrix, k), (k * shift, 0.0)) for k in (-1, 0, 1)]
+            frames = [eight_bit(steps.moved(picture, *power), 1.0, rng) for power in powers]
             for what, field in (("pair", jacoflow.flow(*frames[1:])), ("triple", jacoflow.flow(*frames))):
-                error = np.linalg.norm(field.flow[inside] - truth, axis=-1)
-                std = np.hypot(field.std("u"), field.std("v"))[inside]
-                is_silent = field.valid[inside] & (error > 1) & (error > 5 * std)
-                found.setdefault(f"{what}, valid", []).append(float(field.valid[inside].mean()))
-                found.setdefault(f"{what}, silent", []).append(float(is_silent.mean()))
-        rows.append({"turn, degrees": degrees} | {name: float(np.mean(values)) for name, values in found.items()})
+                valid, silent = _shares(field, truth, inside)
+                found.setdefault(f"{what}, valid", []).append(valid)
+                found.setdefault(f"{what}, silent", []).append(silent)
+        rows.append({name: value} | {what: float(np.mean(shares)) for what, shares in found.items()})
     return rows
+
+
+def _inside(truth: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Sites off the edges that the motion leaves in the frame."""
+    y, x = np.mgrid[: steps.SIZE, : steps.SIZE]
+    ends = np.stack([x, y], axis=-1) + truth
+    inside = ((ends >= 0) & (ends < steps.SIZE)).all(axis=-1)
+    inside[:MARGIN], inside[-MARGIN:], inside[:, :MARGIN], inside[:, -MARGIN:] = (False,) * 4
+    return np.asarray(inside)
+
+
+def _shares(field: jacoflow.FlowField, truth: NDArray[np.float64], inside: NDArray[np.bool_]) -> tuple[float, float]:
+    """Shares of the sites inside that are `valid`, and of those that are, and are off by more than a pixel
+    and five standard deviations."""
+    error = np.linalg.norm(field.flow - truth, axis=-1)[inside]
+    std, valid = np.hypot(field.std("u"), field.std("v"))[inside], field.valid[inside]
+    return float(valid.mean()), float((valid & (error > 1) & (error > 5 * std)).mean())
 
 
 def eight_bit(frame: NDArray[np.float64], noise: float, rng: np.random.Generator) -> NDArray[np.uint8]:
@@ -252,6 +281,7 @@ TABLES = {
     "large_rates": report.Table("Rates of large steps", lambda o: large_rates(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "unrelated": report.Table("Unrelated frames", lambda o: unrelated(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "turning_waves": report.Table("Turning waves", lambda o: turning_waves(SEEDS[: 1 if o.quick else len(SEEDS)])),
+    "coarse_shifts": report.Table("Shifts of coarse texture", lambda o: coarse_shifts(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "two_motions": report.Table("Two motions in a region", lambda o: two_motions(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "turning_discs": report.Table("Turning discs", lambda o: turning_discs(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "noise": report.Table("Noise of a pair", lambda o: noise(SEEDS[: 1 if o.quick else len(SEEDS)])),

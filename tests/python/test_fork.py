@@ -3,12 +3,18 @@ or locks that stayed behind."""
 
 import concurrent.futures
 import functools
+import http.client
+import json
 import multiprocessing
 import multiprocessing.pool
 import os
 import select
 import signal
+import socket
+import subprocess
+import sys
 import threading
+import time
 import traceback
 import warnings
 
@@ -305,3 +311,40 @@ def test_workers_of_joblib_compute_the_same():
     for backend in ("loky", "multiprocessing", "threading"):
         work = (joblib.delayed(results)(threads) for threads in (1, 2))
         assert quietly(lambda work=work, backend=backend: joblib.Parallel(2, backend=backend, timeout=PATIENCE)(work)) == before, backend
+
+
+class UnixConnection(http.client.HTTPConnection):
+    """A connection to a server that listens on a path."""
+
+    def __init__(self, path):
+        super().__init__("localhost", timeout=PATIENCE)
+        self.path = str(path)
+
+    def connect(self):
+        self.sock = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self.sock.settimeout(self.timeout)
+        self.sock.connect(self.path)
+
+
+@needs_fork
+def test_workers_of_a_server_compute_the_same(tmp_path):
+    pytest.importorskip("gunicorn")
+    path, folder = tmp_path / "socket", os.path.dirname(__file__)
+    command = [sys.executable, "-m", "gunicorn", "--preload", "--workers", "2", "--bind", f"unix:{path}", "--chdir", folder]
+    server = subprocess.Popen([*command, "--timeout", str(int(PATIENCE)), "fork_server:application"])
+    try:
+        end = time.monotonic() + PATIENCE
+        while not path.exists():
+            assert server.poll() is None, "the server has ended"
+            assert time.monotonic() < end, "the server does not listen"
+            time.sleep(0.05)
+        expected = [results(1).hex(), results(2).hex()]
+        for _ in range(4):
+            connection = UnixConnection(path)
+            connection.request("GET", "/")
+            answer = json.loads(connection.getresponse().read())
+            connection.close()
+            assert answer == {"results": expected, "loaded": expected[1], "is_forked": True}
+    finally:
+        server.terminate()
+        server.wait(PATIENCE)
