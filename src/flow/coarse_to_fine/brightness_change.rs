@@ -7,7 +7,8 @@
 //! are.
 //!
 //! Before any motion is known, whole frames are compared ([`equalize_roughly`]): enough for the coarse
-//! levels, on whose motion the change is then measured.
+//! levels, on whose motion the change is then measured. A change that was removed, and that the motion then
+//! found explains, is given back.
 
 use super::{brightness_scale::BrightnessScale, data_term::View, planes::Planes, planes::SITE_SPACING};
 use crate::ablation::keeps;
@@ -21,9 +22,10 @@ use crate::types::{Frame, Mask};
 const ROUGH_CHANGE: [f64; 2] = [0.1, 0.2];
 /// Approximate number of pixels of a frame that this is judged by.
 const ROUGH_SAMPLES: usize = 1000;
-/// Maximum standard deviation of the residual that remains, over that before, for a change to be removed: of
-/// frames as they are, and of equalised ones, whose first change is only roughly known.
-const MAX_REMAINING: [f64; 2] = [0.8, 0.98];
+/// Maximum standard deviation of the residual that remains, over that between frames as they are, for a
+/// change to be removed; and over that of the change removed before, for another one to take its place.
+const MAX_REMAINING: f64 = 0.8;
+const MAX_OF_PREVIOUS: f64 = 0.98;
 /// Windows along the longer side, and their minimum distance, sites: each needs enough of them.
 const WINDOWS: f64 = 8.0;
 const MIN_PITCH: f64 = 12.0;
@@ -62,7 +64,7 @@ pub(super) fn equalize_roughly<T: SimdReal>(frames: &[&Frame<T>], mask: Option<&
             let gain = (std(scale) / std(&known)).clamp(GAIN_BOUNDS[0], GAIN_BOUNDS[1]);
             LightMap::constant([gain, scale.mean - gain * known.mean])
         };
-        equalize(frames, &scales.iter().map(of).collect::<Vec<_>>())
+        equalize(frames, scales.iter().map(of).collect())
     })
 }
 
@@ -71,24 +73,21 @@ pub(super) struct Equalized<T> {
     pub frames: Vec<Frame<T>>,
     /// Mean square of the factors that the noise of the compared frames was multiplied by.
     pub noise_gain: f64,
+    /// What was removed from each frame.
+    maps: Vec<LightMap>,
 }
 
-impl<T> Equalized<T> {
-    /// Of frames that were equalised before.
-    pub fn after(self, noise_gain: f64) -> Self {
-        Self { noise_gain: noise_gain * self.noise_gain, ..self }
-    }
-}
-
-fn equalize<T: SimdReal>(frames: &[&Frame<T>], maps: &[LightMap]) -> Equalized<T> {
+fn equalize<T: SimdReal>(frames: &[&Frame<T>], maps: Vec<LightMap>) -> Equalized<T> {
     let mean = |map: &LightMap| map.nodes.iter().map(|[gain, _]| gain.powi(-2)).sum::<f64>() / map.nodes.len() as f64;
     let compared: Vec<f64> =
         maps.iter().enumerate().filter(|(n, _)| frames.len() == 2 || *n != 1).map(|(_, m)| mean(m)).collect();
     let noise_gain = compared.iter().sum::<f64>() / compared.len() as f64;
-    Equalized { frames: frames.iter().zip(maps).map(|(frame, map)| map.remove_from(frame)).collect(), noise_gain }
+    let frames = frames.iter().zip(&maps).map(|(frame, map)| map.remove_from(frame)).collect();
+    Equalized { frames, noise_gain, maps }
 }
 
 /// Gain and offset on a grid, bilinear between the nodes.
+#[derive(Clone)]
 struct LightMap {
     columns: usize,
     rows: usize,
@@ -104,6 +103,14 @@ fn blend(first: &[f64; 2], second: &[f64; 2], share: f64) -> [f64; 2] {
 impl LightMap {
     fn constant(node: [f64; 2]) -> Self {
         Self { columns: 1, rows: 1, pitch: f64::INFINITY, nodes: vec![node] }
+    }
+
+    fn identity() -> Self {
+        Self::constant([1.0, 0.0])
+    }
+
+    fn is_identity(&self) -> bool {
+        self.nodes.iter().all(|node| *node == [1.0, 0.0])
     }
 
     /// Along an axis with `count` nodes: the first of two around a position, the second, and its share.
@@ -126,9 +133,19 @@ impl LightMap {
         blend(&line[left], &line[right], share)
     }
 
+    /// Both changes, on the grid of the second.
+    fn then(&self, second: &Self) -> Self {
+        let of = |(node, &[gain, offset]): (usize, &[f64; 2])| {
+            let at = |place: usize| if place == 0 { 0.0 } else { second.pitch * place as f64 };
+            let first = self.at(at(node % second.columns), at(node / second.columns));
+            [first[0] * gain, first[0] * offset + first[1]]
+        };
+        Self { nodes: second.nodes.iter().enumerate().map(of).collect(), ..*second }
+    }
+
     fn remove_from<T: SimdReal>(&self, frame: &Frame<T>) -> Frame<T> {
         let mut out = frame.clone();
-        if self.nodes.iter().all(|node| *node == [1.0, 0.0]) {
+        if self.is_identity() {
             return out;
         }
         parallel::for_each(out.data_mut().chunks_mut(frame.width().max(1)).enumerate(), |(y, row)| {
@@ -150,28 +167,59 @@ impl LightMap {
     }
 }
 
-/// Removes the change along the `motion` of a level from the frames; `None` if there is none. `scale`: px of
-/// the frame per px of the level; `are_equalized`: whether frames were equalised before.
-pub(super) fn equalize_along<T: SimdReal>(
+/// What is to be removed from each frame.
+pub(super) struct Change(Vec<LightMap>);
+
+impl Change {
+    /// The frames without it; `None` if there is none.
+    pub fn removed_from<T: SimdReal>(self, frames: &[&Frame<T>]) -> Option<Equalized<T>> {
+        (!self.0.iter().all(LightMap::is_identity)).then(|| equalize(frames, self.0))
+    }
+}
+
+/// Measures the change along the `motion` of a level between `views`, those of frames without what was
+/// `removed` before; `None` if that is what there is to remove. `scale`: px of the frame per px of the level.
+pub(super) fn change_along<T: SimdReal>(
     simd: Level,
-    frames: &[&Frame<T>],
     (views, brightness): (&[View<'_, T>], BrightnessScale),
-    motion: &Planes<T>,
-    (scale, are_equalized): (f64, bool),
-) -> Option<Equalized<T>> {
-    let samples: Vec<Vec<f64>> = views.iter().map(|view| sample(simd, view, motion)).collect();
-    let reference = reference(frames.len());
-    let size = (motion.width, motion.height);
-    let most = MAX_REMAINING[usize::from(are_equalized)];
-    let of = |n: usize| (n != reference).then(|| fit(size, &samples[reference], &samples[n], most)).flatten();
-    let found: Vec<Option<LightMap>> = (0..samples.len()).map(of).collect();
-    if found.iter().all(Option::is_none) || !keeps("flow.brightness_change") {
+    (motion, scale): (&Planes<T>, f64),
+    removed: Option<&Equalized<T>>,
+) -> Option<Change> {
+    if !keeps("flow.brightness_change") {
         return None;
     }
-    let map = |found: Option<LightMap>| {
-        found.map_or(LightMap::constant([1.0, 0.0]), |map| in_frames(&map, scale * SITE_SPACING, brightness))
+    let samples: Vec<Vec<f64>> = views.iter().map(|view| sample(simd, view, motion)).collect();
+    let reference = reference(views.len());
+    let (size, site) = ((motion.width, motion.height), scale * SITE_SPACING);
+    let previous = |n: usize| removed.map_or_else(LightMap::identity, |removed| removed.maps[n].clone());
+    let of = |n: usize| {
+        let previous = on_sites(&previous(n), site, brightness);
+        (n != reference).then(|| change(size, &samples[reference], &samples[n], &previous)).flatten()
     };
-    Some(equalize(frames, &found.into_iter().map(map).collect::<Vec<_>>()))
+    let found: Vec<Option<LightMap>> = (0..samples.len()).map(of).collect();
+    if found.iter().all(Option::is_none) {
+        return None;
+    }
+    let map_of = |(n, found): (usize, Option<LightMap>)| {
+        found.map_or_else(|| previous(n), |map| in_frames(&map, site, brightness))
+    };
+    Some(Change(found.into_iter().enumerate().map(map_of).collect()))
+}
+
+/// The change of the `other` brightness, from which `previous` was removed, against the `known` one; `None`
+/// if it is the previous one.
+fn change(size: (usize, usize), known: &[f64], other: &[f64], previous: &LightMap) -> Option<LightMap> {
+    let (further, between, remaining) = fit(size, known, other)?;
+    let of_site = |(site, (known, other)): (usize, (&f64, &f64))| {
+        let [gain, offset] = previous.at((site % size.0) as f64, (site / size.0) as f64);
+        (gain * other + offset - known).abs()
+    };
+    let originals = known.iter().zip(other).enumerate().map(of_site);
+    let original = robust_std(&mut originals.filter(|r| r.is_finite()).collect::<Vec<f64>>())?;
+    if remaining > MAX_REMAINING * original {
+        return (!previous.is_identity()).then(LightMap::identity);
+    }
+    (remaining < MAX_OF_PREVIOUS * between).then(|| previous.then(&further))
 }
 
 /// Brightness of a view at the sites, along the motion; NaN beyond the frame.
@@ -197,9 +245,9 @@ fn sample<T: SimdReal>(simd: Level, view: &View<'_, T>, motion: &Planes<T>) -> V
     parallel::map(0..motion.height, row).concat()
 }
 
-/// Gain and offset of the `other` brightness over the `known` one, on the sites; `None` if more than the
-/// share `most` of the difference remains.
-fn fit((width, height): (usize, usize), known: &[f64], other: &[f64], most: f64) -> Option<LightMap> {
+/// Gain and offset of the `other` brightness over the `known` one, on the sites, and the standard deviations
+/// of their difference and of what remains of it; `None` for too few sites.
+fn fit((width, height): (usize, usize), known: &[f64], other: &[f64]) -> Option<(LightMap, f64, f64)> {
     let pitch = (width.max(height) as f64 / WINDOWS).max(MIN_PITCH);
     let [columns, rows] = [width, height].map(|len| ((len as f64 - 1.0) / pitch).ceil() as usize + 1);
     let mut map = LightMap { columns, rows, pitch, nodes: vec![[1.0, 0.0]; columns * rows] };
@@ -215,7 +263,7 @@ fn fit((width, height): (usize, usize), known: &[f64], other: &[f64], most: f64)
         compared.improve(&mut map, scale);
         scale = compared.residual_std(&map)?;
     }
-    (scale < most * before).then_some(map)
+    Some((map, before, scale))
 }
 
 /// Two brightnesses of all sites, row by row.
@@ -288,6 +336,12 @@ impl ComparedBrightness<'_> {
 
 fn add(sums: &mut [f64; 5], share: f64, terms: &[f64; 5]) {
     sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += share * term);
+}
+
+/// A map of frames on sites, of brightness `(I - mean) gain`; `site`: distance of sites, px.
+fn on_sites(map: &LightMap, site: f64, brightness: BrightnessScale) -> LightMap {
+    let node = |&[gain, offset]: &[f64; 2]| [gain, (offset - brightness.mean * (1.0 - gain)) * brightness.gain];
+    LightMap { pitch: map.pitch / site, nodes: map.nodes.iter().map(node).collect(), ..*map }
 }
 
 /// A map on sites, of brightness `(I - mean) gain`, in units of the frames; `site`: distance of sites, px.

@@ -1,7 +1,7 @@
 //! Entry point: runs the stages from frames to a filled field.
 
 use super::acceleration::to_middle_frame;
-use super::brightness_change::{equalize_along, equalize_roughly};
+use super::brightness_change::{change_along, equalize_roughly};
 use super::brightness_scale::BrightnessScale;
 use super::descent::{DescentPlan, DescentResult};
 use super::detail_bias::DetailBias;
@@ -95,18 +95,16 @@ impl CoarseToFine {
             let coarse = plan.estimate_coarse_levels(workspace);
             let views = workspace.pyramid.levels()[level].views(ComparedFrames::All);
             let pixel = f64::from(1u32 << level);
-            let again =
-                equalize_along(simd, compared, (&views, brightness), &coarse.motion, (pixel, equalized.is_some()));
+            let change = change_along(simd, (&views, brightness), (&coarse.motion, pixel), equalized.as_ref());
             measurements += 1;
-            let noise_gain = equalized.as_ref().map_or(1.0, |equalized| equalized.noise_gain);
             // To equalise frames without contrast would make texture of their rounding.
             let has_contrast = |frame: &&Frame<T>| BrightnessScale::of(&[*frame], mask).contrast > 0.0;
-            let again = again.filter(|_| measurements < MAX_MEASUREMENTS && frames.iter().all(has_contrast));
-            let Some(again) = again else {
-                return (plan, coarse, noise_gain);
+            let change = change.filter(|_| measurements < MAX_MEASUREMENTS && frames.iter().all(has_contrast));
+            let Some(change) = change else {
+                return (plan, coarse, equalized.map_or(1.0, |equalized| equalized.noise_gain));
             };
             coarse.recycle(&workspace.space);
-            equalized = Some(again.after(noise_gain));
+            equalized = change.removed_from(frames);
         }
     }
 }
