@@ -80,7 +80,6 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("particle.aspect", "width and height change together"),
     ("particle.quick_start", "half of the first particles take the motion of tracks"),
     ("particle.recovery", "a hidden target takes over a group of tracks"),
-    ("particle.velocity_factor", "particles near the constant-velocity prediction weigh more"),
     ("particle.near_particles", "more particles while another target is near"),
     ("particle.touching_boxes", "targets whose boxes touch are near"),
     ("particle.likeness", "colour counts less beside a look-alike"),

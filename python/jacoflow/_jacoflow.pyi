@@ -86,6 +86,7 @@ __all__ = [
     "_felzenszwalb",
     "_region_means",
     "_edge_disparity",
+    "_check_camera",
     "_edge_pixels",
     "_estimate_row_offset",
     "_read_disparity",
@@ -1668,6 +1669,7 @@ def _region_means(labels: NDArray[np.int64], values: ArrayLike) -> NDArray[np.fl
 def _edge_disparity(
     left: ArrayLike, right: ArrayLike, options: dict[str, Any]
 ) -> tuple[NDArray[np.float32], NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32], tuple[float, bool]]: ...
+def _check_camera(focal: float, baseline: float, d_infinity: float) -> None: ...
 def _edge_pixels(
     view: ArrayLike, blur_sigma: float, threshold: float, threads: int | None
 ) -> tuple[NDArray[np.uint32], NDArray[np.uint32]]: ...

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ._checks import converted, real_number, switch, word
+from ._jacoflow import _check_camera
 
 COUNTS = ("n_components", "random_state", "search", "threads")
 """Counts, no unit; None where the default depends on the mode."""
@@ -50,12 +51,8 @@ class StereoCamera:
 
     def __post_init__(self) -> None:
         for name in ("focal", "baseline", "d_infinity"):
-            value = real_number(name, getattr(self, name))
-            object.__setattr__(self, name, value)
-            if name == "d_infinity" and not np.isfinite(value):
-                raise ValueError(f"{name}: expected a disparity, px, got {value}")
-            if name != "d_infinity" and not (value > 0 and np.isfinite(value)):
-                raise ValueError(f"{name}: expected a length above 0, got {value}")
+            object.__setattr__(self, name, real_number(name, getattr(self, name)))
+        _check_camera(*astuple(self))
 
 
 def checked(options: Mapping[str, Any]) -> dict[str, Any]:

@@ -77,7 +77,7 @@ mod _jacoflow {
         scenes::{Scene, Sensor, scene_carriers, scene_names, scene_parameters},
         segment::{segment_felzenszwalb, segment_region_means},
         stereo::{edge_disparity, edge_pixels, estimate_row_offset, read_disparity, write_disparity},
-        stereo_track::{PyStereoTracker, PyTrackGraph, restore_stereo_tracker},
+        stereo_track::{PyStereoTracker, PyTrackGraph, check_camera, restore_stereo_tracker},
         target_scenes::{TargetScene, target_scene_names},
         track::{PyGradientTracker, detect, restore_gradient_tracker},
     };

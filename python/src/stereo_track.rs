@@ -11,7 +11,7 @@ use crate::interrupt::Held;
 use crate::options::named;
 use jacoflow::error::Error;
 use jacoflow::track::GreyLevels;
-use jacoflow::track::stereo::{EdgePoints, Node, Step, StereoTracker, TrackGraph};
+use jacoflow::track::stereo::{EdgePoints, Node, Step, StereoCamera, StereoTracker, TrackGraph};
 use jacoflow::types::{AnyFrame, Frame};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
@@ -145,6 +145,13 @@ impl PyStereoTracker {
         let restore = py.import("jacoflow._jacoflow")?.getattr("_restore_stereo_tracker")?;
         Ok((restore, (PyBytes::new(py, &bytes), gain)))
     }
+}
+
+/// Refuses a length or a disparity of `jacoflow.track.StereoCamera` by its name.
+#[pyfunction(name = "_check_camera")]
+#[pyo3(signature = (focal, baseline, d_infinity))]
+pub fn check_camera(focal: f64, baseline: f64, d_infinity: f64) -> Outcome<()> {
+    Ok(StereoCamera { focal, baseline, d_infinity }.check()?)
 }
 
 /// The inverse of `_StereoTracker.__reduce__`.

@@ -28,10 +28,10 @@ pub struct MatchingArguments {
     pub search: SearchArguments,
     /// Whole disparities (sgm)
     #[arg(long)]
-    pub whole: bool,
+    pub no_subpixel: bool,
     /// Keep what matching from the right view does not confirm too (sgm)
     #[arg(long)]
-    pub unchecked: bool,
+    pub no_left_right_check: bool,
     /// Least slope of an edge, grey levels/px
     #[arg(long, value_name = "SLOPE", default_value_t = 2.0)]
     pub threshold: f64,
@@ -126,8 +126,8 @@ impl StereoCommand {
             disparity_range: search.disparity_range.unwrap_or(defaults.disparity_range),
             row_range: search.row_range.unwrap_or(defaults.row_range),
             row_offset: search.row_offset,
-            subpixel: !self.matching.whole,
-            left_right_check: !self.matching.unchecked,
+            subpixel: !self.matching.no_subpixel,
+            left_right_check: !self.matching.no_left_right_check,
             threshold: self.matching.threshold,
             threads: Threads::new(self.threads.threads)?,
             ..defaults

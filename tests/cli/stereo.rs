@@ -233,7 +233,7 @@ fn semi_global_matching_gives_whole_pixels_when_asked() {
         assert!(all > 300, "{option}: {all}");
         all - whole
     };
-    assert_eq!((fractions("--whole"), fractions("--whole --unchecked")), (0, 0));
+    assert_eq!((fractions("--no-subpixel"), fractions("--no-subpixel --no-left-right-check")), (0, 0));
     assert!(fractions("") > 300);
 }
 

@@ -128,10 +128,8 @@ fn parse_grid(text: &str) -> std::result::Result<CellGrid, String> {
 
 fn parse_cameras(text: &str) -> std::result::Result<StereoCamera, String> {
     let given = numbers(text).or_else(|| numbers(text).map(|[focal, baseline]: [f64; 2]| [focal, baseline, 0.0]));
-    match given {
-        Some([focal, baseline, d_infinity]) if focal > 0.0 && baseline > 0.0 => {
-            Ok(StereoCamera { focal, baseline, d_infinity })
-        }
-        _ => Err("expected FOCAL,BASELINE or FOCAL,BASELINE,INFINITY, the first two positive".into()),
-    }
+    let [focal, baseline, d_infinity] = given.ok_or("expected FOCAL,BASELINE or FOCAL,BASELINE,INFINITY")?;
+    let camera = StereoCamera { focal, baseline, d_infinity };
+    camera.check().map_err(|problem| problem.to_string())?;
+    Ok(camera)
 }

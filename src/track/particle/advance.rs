@@ -114,8 +114,7 @@ impl Target {
         let prediction = &context.predictions[own];
         let particles = &self.cloud.particles;
         let on = &context.factors;
-        let velocity = (on.velocity && crate::ablation::keeps("particle.velocity_factor"))
-            .then(|| VelocityFactor::new(place, self.velocity(), context.scale));
+        let velocity = on.velocity.then(|| VelocityFactor::new(place, self.velocity(), context.scale));
         if self.presence.is_hidden() {
             let factors = Factors { velocity, ..Factors::none(context.bins.size()) };
             return factors.log_likelihoods(particles);
