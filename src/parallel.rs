@@ -3,7 +3,6 @@
 mod interrupt;
 mod tasks;
 
-pub(crate) use interrupt::shared_checkpoint;
 pub use interrupt::{Interrupt, checkpoint};
 pub(crate) use tasks::{for_each, for_each_value, join, map, map_range, thread_count};
 
@@ -182,17 +181,20 @@ fn in_bands<T: Send>(band_rows: usize, buffer: &mut [T], row_len: usize, work: &
     if row_len == 0 {
         return;
     }
-    let (rows, interrupt) = (buffer.len() / row_len, current());
+    let rows = buffer.len() / row_len;
     let one_band = |(band, slice): (usize, &mut [T])| {
         let start = band * band_rows;
-        under(interrupt.clone(), || {
-            checkpoint();
-            work(band, start..(start + band_rows).min(rows), slice);
-        });
+        work(band, start..(start + band_rows).min(rows), slice);
     };
     let is_serial = tasks::is_outside() && buffer.len() <= MAX_SERIAL;
     let bands = buffer.chunks_mut(band_rows * row_len).enumerate();
-    if is_serial { bands.for_each(one_band) } else { for_each(bands, one_band) }
+    if !is_serial {
+        return for_each(bands, one_band);
+    }
+    for band in bands {
+        checkpoint();
+        one_band(band);
+    }
 }
 
 /// Receives the progress of long work; may stop it.

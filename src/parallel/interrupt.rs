@@ -1,6 +1,6 @@
 //! Stops long work from another thread: Ctrl-C must not wait for the end of a fit.
 //!
-//! Work looks for the request between rounds and bands of rows ([`checkpoint`]). A stop unwinds the stack
+//! Work looks for the request before each task and between rounds ([`checkpoint`]). A stop unwinds the stack
 //! without running the panic hook, so that no function on the way has to hand a result of "stopped" through,
 //! and nothing is returned that is half computed.
 
@@ -48,16 +48,6 @@ pub fn checkpoint() {
     }
 }
 
-/// The [`checkpoint`] of this thread's work, for its tasks on other threads.
-pub(crate) fn shared_checkpoint() -> impl Fn() + Send + Sync {
-    let interrupt = current();
-    move || {
-        if interrupt.as_ref().is_some_and(|i| i.0.load(Ordering::Relaxed)) {
-            resume_unwind(Box::new(Stopped));
-        }
-    }
-}
-
 /// The interrupt of this thread's work, for threads that share it.
 pub(super) fn current() -> Option<Interrupt> {
     CURRENT.with_borrow(Clone::clone)
@@ -77,7 +67,7 @@ pub(super) fn under<R>(interrupt: Option<Interrupt>, work: impl FnOnce() -> R) -
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Threads, for_each_band};
+    use super::super::{Threads, for_each_band, map};
     use super::*;
     use std::sync::atomic::AtomicUsize;
 
@@ -105,19 +95,19 @@ mod tests {
     }
 
     #[test]
-    fn tasks_on_other_threads_stop_with_the_work() {
-        let interrupt = Interrupt::default();
-        let result = interrupt.watch(|| {
-            let checkpoint = shared_checkpoint();
-            std::thread::scope(|scope| {
-                let watched = || catch_unwind(AssertUnwindSafe(&checkpoint)).is_err();
-                assert!(!scope.spawn(watched).join().unwrap());
+    fn tasks_of_tasks_stop_on_any_number_of_threads() {
+        for threads in [1, 3] {
+            let threads = Threads::new(Some(threads)).unwrap();
+            let (interrupt, done) = (Interrupt::default(), AtomicUsize::new(0));
+            let inner = || {
+                done.fetch_add(1, Ordering::Relaxed);
                 interrupt.request();
-                assert!(scope.spawn(watched).join().unwrap());
-            });
-            checkpoint();
-        });
-        assert!(matches!(result, Err(Error::Interrupted)));
+            };
+            let result = interrupt.watch(|| threads.install(|| map(0..50, |_| map(0..50, |_| inner()).len())));
+            assert!(matches!(result, Err(Error::Interrupted)));
+            // Tasks that had begun on another thread end.
+            assert!(done.into_inner() <= 3);
+        }
     }
 
     #[test]

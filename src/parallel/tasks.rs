@@ -3,15 +3,28 @@
 //! Rayon's functions are generic over the work and hold several copies of it. Here they get it behind a
 //! pointer and are compiled once; what is generic below is a loop.
 
+use super::interrupt::{checkpoint, current, under};
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
 /// Calls `work` with every number below `count`, each in a task of its own.
 ///
-/// Outside of every pool, that of the default number of threads does it: never rayon's global one.
+/// Each is a [`checkpoint`] of the work that they belong to. Outside of every pool, that of the default
+/// number of threads does it: never rayon's global one.
 fn run_tasks(count: usize, work: &(dyn Fn(usize) + Sync)) {
+    let interrupt = current();
+    // Also without a request that may come: a thread that waits for one work does tasks of another.
+    run_unwatched(count, &|number| {
+        under(interrupt.clone(), || {
+            checkpoint();
+            work(number);
+        });
+    });
+}
+
+fn run_unwatched(count: usize, work: &(dyn Fn(usize) + Sync)) {
     if count > 1 && is_outside() {
-        super::install(super::Threads::default().count(), &mut || run_tasks(count, work));
+        super::install(super::Threads::default().count(), &mut || run_unwatched(count, work));
     } else if count > 1 && rayon::current_num_threads() > 1 {
         // One number a task: with larger shares one thread would wait for the other.
         (0..count).into_par_iter().with_max_len(1).for_each(work);

@@ -4,7 +4,7 @@ use super::{edges::Edge, edges::EdgeWeight, edges::second_offsets};
 use crate::parallel::checkpoint;
 
 /// Edges between two looks for a request to stop.
-const EDGES_PER_CHECKPOINT: usize = 1 << 16;
+pub(super) const EDGES_PER_CHECKPOINT: usize = 1 << 16;
 
 /// Disjoint regions of pixels; each region is a tree, its root carries the region's size and threshold.
 #[derive(Debug)]

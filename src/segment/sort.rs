@@ -1,6 +1,6 @@
 //! Stable sorting of edges by weight: least significant digit first.
 
-use super::{edges::Edge, edges::EdgeKey};
+use super::{edges::Edge, edges::EdgeKey, forest::EDGES_PER_CHECKPOINT};
 use crate::parallel::checkpoint;
 
 /// Bits of a digit: the counters of 2^11 digits stay in the first-level cache.
@@ -18,7 +18,6 @@ pub(super) fn sort_by_weight<K: EdgeKey>(edges: &mut Vec<Edge<K>>) {
     }
     let mut sorted = vec![Edge::default(); edges.len()];
     for (pass, counts) in counts.iter_mut().enumerate() {
-        checkpoint();
         // All edges share this digit: nothing to do.
         if counts.iter().any(|&count| count as usize == edges.len()) {
             continue;
@@ -27,10 +26,13 @@ pub(super) fn sort_by_weight<K: EdgeKey>(edges: &mut Vec<Edge<K>>) {
         for count in counts.iter_mut() {
             next += std::mem::replace(count, next);
         }
-        for edge in edges.iter() {
-            let place = &mut counts[digit(edge, pass)];
-            sorted[*place as usize] = *edge;
-            *place += 1;
+        for edges in edges.chunks(EDGES_PER_CHECKPOINT) {
+            checkpoint();
+            for edge in edges {
+                let place = &mut counts[digit(edge, pass)];
+                sorted[*place as usize] = *edge;
+                *place += 1;
+            }
         }
         std::mem::swap(edges, &mut sorted);
     }

@@ -7,6 +7,7 @@
 //! caches.
 
 use super::{cost::CHUNK, cost::UNIT, edges::EdgeMap};
+use crate::parallel::checkpoint;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 
 /// Largest distance of the edge pixel behind, px.
@@ -17,6 +18,8 @@ const PENALTIES: [f64; 2] = [1.0, 6.0];
 const DIRECTIONS: usize = 4;
 /// Cost beyond the first and the last candidate.
 const WALL: u16 = 60000;
+/// Edge pixels between two looks for a request to stop.
+const EDGES_PER_CHECKPOINT: usize = 1 << 10;
 /// No edge pixel yet.
 const NONE: u32 = u32::MAX;
 
@@ -105,6 +108,9 @@ impl Kernel<f32> for Sweep<'_> {
         let mut least = vec![0u16; DIRECTIONS * kept];
         let mut last = Last::new(width, height);
         for step in 0..count {
+            if step % EDGES_PER_CHECKPOINT == 0 {
+                checkpoint();
+            }
             let of = |step: usize| if from == From::Above { step } else { count - 1 - step };
             let edge = of(step);
             let (x, y) = (edges.columns[edge] as usize, edges.rows[edge] as usize);

@@ -5,7 +5,7 @@ use super::cost::{Candidates, Coded, MAX_COST, Side, costs};
 use super::edges::{EdgeMap, EdgeSettings};
 use super::options::EdgeDisparityOptions;
 use crate::image::gaussian_gradient;
-use crate::parallel::{self, checkpoint};
+use crate::parallel;
 use crate::simd::Level;
 use crate::types::Frame;
 use std::ops::Range;
@@ -78,9 +78,7 @@ pub(super) fn match_views(left: &View, right: &View, options: &EdgeDisparityOpti
     }
     let everywhere = |edge: usize| from_right.inside(right.edges.columns[edge], width);
     let find_right = || winners(&right.edges, [&other, &own], from_right, everywhere, place, |k| least as f32 + k);
-    checkpoint();
     let (mut matches, confirming) = parallel::join(find_left, find_right);
-    checkpoint();
     keep_confirmed(&left.edges, &mut matches, &right.edges, &confirming);
     matches
 }

@@ -17,7 +17,7 @@
 use super::FlowFilter;
 use super::flow_filter::PAIRS;
 use crate::error::Result;
-use crate::parallel::{self, checkpoint, shared_checkpoint};
+use crate::parallel::{self, checkpoint};
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, MOTION_NAMES, Status};
 use nalgebra::{Matrix6, SymmetricEigen, Vector6};
@@ -55,14 +55,12 @@ pub(super) fn smooth<T: SimdReal>(filter: &FlowFilter<T>, frames: &[Frame<T>]) -
     for (t, frame) in frames.iter().enumerate().rev() {
         checkpoint();
         back.push(frame)?;
-        let (known, stop) = (Known::new(&back, frames.len() - t), shared_checkpoint());
+        let known = Known::new(&back, frames.len() - t);
         threads.install(|| {
             update_beyond(&mut beyond, &fields[t], (sites, &states[t]));
             let (ahead, back) = (&states[t], motions(&back));
-            let joined = parallel::map_range(sites.len(), SITES_PER_TASK, |n| {
-                stop();
-                with(known.join(&ahead[n], &back[n]), &beyond[n])
-            });
+            let joined =
+                parallel::map_range(sites.len(), SITES_PER_TASK, |n| with(known.join(&ahead[n], &back[n]), &beyond[n]));
             write(&mut fields[t], sites.iter().zip(&seen).zip(&joined));
         });
     }
@@ -81,9 +79,7 @@ pub(super) fn bytes<T>(filter: &FlowFilter<T>, frames: usize) -> Option<usize> {
 type Site<T> = [T; NUMBERS];
 
 fn motions<T: SimdReal>(filter: &FlowFilter<T>) -> Vec<Site<T>> {
-    let checkpoint = shared_checkpoint();
     let site = |index: usize| {
-        checkpoint();
         let (mean, covariance) = filter.store.state(index);
         std::array::from_fn(|k| match k {
             0..6 => T::from_f64(mean[MOTION + k]),
@@ -155,9 +151,7 @@ fn update_beyond<T: SimdReal>(
 ) {
     let Some(planes) = &field.covariance else { return };
     let (n, units) = (field.len(), MOTION_NAMES.map(|name| field.layout.units.scale(name)));
-    let checkpoint = shared_checkpoint();
     parallel::for_each_value(beyond, SITES_PER_TASK, |place, beyond| {
-        checkpoint();
         let (site, state) = (sites[place], &states[place]);
         if field.status[site] == Status::NonFinite {
             return;

@@ -37,6 +37,7 @@ ENDLESS = {
     "mixture": "mixture.VariationalGaussianMixture(8, max_iter=10**9, tol=None).fit(points)",
     "starts of a mixture": "mixture.VariationalGaussianMixture(4, max_iter=2, n_init=10**9).fit(points)",
     "Dirichlet mixture": "mixture.DirichletProcessGaussianMixture(8, max_iter=10**9, tol=None).fit(points)",
+    "points": "jacoflow.point_flow(texture, texture[::-1].copy(), np.full((10**6, 2), 600.0), window=201, max_steps=1000)",
     "frames of a scene": "jacoflow.scenes.Scene('turbulence', width=640, height=480).frame(2e4)",
 }
 

@@ -31,7 +31,7 @@ mod uncertainty;
 use super::{model::ModelKind, options::EstimatorOptions, options::RankPolicy, site::bands};
 use crate::error::Result;
 use crate::jet::{JetRows, JetStencil, Neighbourhood, TimeScheme};
-use crate::parallel::{self, shared_checkpoint};
+use crate::parallel;
 use crate::simd::SimdReal;
 use crate::types::{FlowField, Frame, Rect, SamplingGrid};
 use dense::Source;
@@ -102,10 +102,9 @@ impl Instantaneous {
             }
             _ => None,
         };
-        let (all, checkpoint) = (bands(field), shared_checkpoint());
+        let all = bands(field);
         common.threads.install(|| {
             parallel::for_each(all, |mut band| {
-                checkpoint();
                 if let Some(plan) = &rows {
                     return job.rows(&mut band, width, plan);
                 }

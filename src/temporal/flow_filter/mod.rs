@@ -9,7 +9,7 @@ use super::options::FlowFilterOptions;
 use super::store::Store;
 use crate::error::{Error, Result};
 use crate::jet::JetStencil;
-use crate::parallel::{self, Threads, checkpoint, shared_checkpoint};
+use crate::parallel::{self, Threads, checkpoint};
 use crate::simd::{Level, SimdReal};
 use crate::types::{FieldLayout, FlowField, Frame, Interval, MOTION_NAMES, Status};
 pub(super) use pass::PAIRS;
@@ -185,9 +185,7 @@ impl<T: SimdReal> FlowFilter<T> {
         if n == 0 {
             return Ok(field);
         }
-        let checkpoint = shared_checkpoint();
         let fill = |plane: &mut [T], row: usize, unit: f64| {
-            checkpoint();
             let unit = T::from_f64(unit);
             let blocks = results.chunks_exact(rows.count * BLOCK);
             for ((block, mark), sites) in blocks.zip(marks).zip(self.store.sites.chunks(BLOCK)) {

@@ -2,7 +2,7 @@
 
 use super::FlowFilter;
 use crate::error::{Error, Result};
-use crate::parallel::{self, shared_checkpoint};
+use crate::parallel;
 use crate::simd::{Level, SimdReal, dispatch};
 use crate::temporal::kernel::predict::{AUGMENTED, EXTENDED, FAST, NON_AUGMENTED, Predict};
 use crate::temporal::kernel::transition::{Exact, Rk4, Step};
@@ -64,7 +64,7 @@ fn double_precision(filter: &mut FlowFilter<f64>, frame: &Frame<f64>, marks: &mu
 
 /// Every block through its three passes; results are copied out while in the cache.
 fn every_block<T: SimdReal>(filter: &mut FlowFilter<T>, frame: &Frame<T>, marks: &mut [Mark], results: &mut [T]) {
-    let (rows, checkpoint) = (filter.rows(), shared_checkpoint());
+    let rows = filter.rows();
     let FlowFilter { options, store, constants, decorrelation, fit, .. } = filter;
     let level = options.simd.unwrap_or_else(Level::detect);
     let pass = Pass {
@@ -85,7 +85,6 @@ fn every_block<T: SimdReal>(filter: &mut FlowFilter<T>, frame: &Frame<T>, marks:
     let marks = marks.chunks_mut(TASK_BLOCKS);
     let results = results.chunks_mut(rows.count * BLOCK * TASK_BLOCKS);
     parallel::for_each(states.zip(pixels).zip(marks).zip(results), |(((states, pixels), marks), results)| {
-        checkpoint();
         let states = states.chunks_mut(PLANES * BLOCK * PASS_BLOCKS);
         let pixels = pixels.chunks(BLOCK * PASS_BLOCKS);
         let marks = marks.chunks_mut(PASS_BLOCKS);
