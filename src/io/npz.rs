@@ -9,7 +9,7 @@ use super::write::AtomicFile;
 use crate::error::{Error, Result};
 use crate::math::Real;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, Write};
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use zip::result::ZipError;
 use zip::write::SimpleFileOptions;
@@ -18,8 +18,64 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter};
 /// Writes named arrays, one after another.
 #[derive(Debug)]
 pub struct NpzWriter<W: Write + Seek> {
-    zip: ZipWriter<W>,
+    zip: ZipWriter<UntilError<W>>,
     path: PathBuf,
+}
+
+/// A place that says once that it failed, and pretends from then on: an archive that is dropped tries to
+/// write its end, and prints that it cannot.
+#[derive(Debug)]
+pub struct UntilError<W> {
+    place: W,
+    /// Where the next byte is.
+    at: u64,
+    failed: bool,
+}
+
+impl<W> UntilError<W> {
+    fn new(place: W) -> Self {
+        Self { place, at: 0, failed: false }
+    }
+
+    fn try_to<R>(&mut self, pretended: R, act: impl FnOnce(&mut W) -> io::Result<R>) -> io::Result<R> {
+        if self.failed {
+            return Ok(pretended);
+        }
+        let result = act(&mut self.place);
+        self.failed = result.as_ref().is_err_and(|error| error.kind() != io::ErrorKind::Interrupted);
+        result
+    }
+}
+
+impl<W: Write> Write for UntilError<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let count = self.try_to(bytes.len(), |place| place.write(bytes))?;
+        self.at += count as u64;
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.try_to((), Write::flush)
+    }
+}
+
+impl<W: Seek> Seek for UntilError<W> {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        let pretended = match to {
+            SeekFrom::Start(place) => place,
+            SeekFrom::Current(by) | SeekFrom::End(by) => self.at.saturating_add_signed(by),
+        };
+        self.at = self.try_to(pretended, |place| place.seek(to))?;
+        Ok(self.at)
+    }
+}
+
+/// The error of the system, with its code, where it is one.
+fn io_error(error: ZipError) -> io::Error {
+    match error {
+        ZipError::Io(error) => error,
+        other => other.into(),
+    }
 }
 
 impl NpzWriter<AtomicFile> {
@@ -41,7 +97,7 @@ impl NpzWriter<AtomicFile> {
 impl<W: Write + Seek> NpzWriter<W> {
     /// An archive in any seekable place; `name` stands for it in messages.
     pub fn new(place: W, name: impl AsRef<Path>) -> Self {
-        Self { zip: ZipWriter::new(place), path: name.as_ref().to_path_buf() }
+        Self { zip: ZipWriter::new(UntilError::new(place)), path: name.as_ref().to_path_buf() }
     }
 
     /// Adds an array in C order.
@@ -68,13 +124,13 @@ impl<W: Write + Seek> NpzWriter<W> {
         &mut self,
         name: &str,
         header: &NpyHeader,
-        write: impl FnOnce(&mut ZipWriter<W>) -> std::io::Result<()>,
+        write: impl FnOnce(&mut ZipWriter<UntilError<W>>) -> io::Result<()>,
     ) -> Result<()> {
         // Beyond 4 GiB an entry needs the 64-bit form, which must be announced.
         let large = header.byte_count().is_none_or(|n| n >= (u32::MAX - 4096) as usize);
         let options = SimpleFileOptions::default().compression_method(CompressionMethod::Stored).large_file(large);
         let zip = &mut self.zip;
-        let written = zip.start_file(format!("{name}.npy"), options).map_err(std::io::Error::from).and_then(|()| {
+        let written = zip.start_file(format!("{name}.npy"), options).map_err(io_error).and_then(|()| {
             header.write(zip, 0)?;
             write(zip)
         });
@@ -96,7 +152,7 @@ impl<W: Write + Seek> NpzWriter<W> {
     /// # Errors
     /// [`Error::Io`] when the rest cannot be written.
     pub fn into_inner(self) -> Result<W> {
-        self.zip.finish().map_err(|e| Error::io(&self.path, e.into()))
+        self.zip.finish().map(|whole| whole.place).map_err(|e| Error::io(&self.path, io_error(e)))
     }
 }
 
@@ -125,7 +181,7 @@ impl NpzReader<BufReader<File>> {
         let path = path.as_ref();
         let file = File::open(path).map_err(|e| Error::io(path, e))?;
         if file.metadata().is_ok_and(|m| m.is_dir()) {
-            return Err(Error::io(path, std::io::Error::from(std::io::ErrorKind::IsADirectory)));
+            return Err(Error::io(path, io::Error::from(io::ErrorKind::IsADirectory)));
         }
         Self::new(BufReader::with_capacity(1 << 18, file), path)
     }
@@ -244,7 +300,7 @@ fn zip_error(path: &Path, error: ZipError) -> Error {
         ZipError::Io(e)
             if !matches!(
                 e.kind(),
-                std::io::ErrorKind::UnexpectedEof | std::io::ErrorKind::InvalidData | std::io::ErrorKind::InvalidInput
+                io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidData | io::ErrorKind::InvalidInput
             ) =>
         {
             Error::io(path, e)

@@ -79,8 +79,9 @@ impl Temporary {
         Ok(Self(Some(file)))
     }
 
-    fn file(&mut self) -> io::Result<&mut NamedTempFile> {
-        self.0.as_mut().ok_or_else(|| io::ErrorKind::NotFound.into())
+    /// Its errors are the system's, with their code; those of the named file hold its temporary name instead.
+    fn file(&mut self) -> io::Result<&mut File> {
+        self.0.as_mut().map(NamedTempFile::as_file_mut).ok_or_else(|| io::ErrorKind::NotFound.into())
     }
 
     fn persist(mut self, target: &Path) -> io::Result<()> {

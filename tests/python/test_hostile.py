@@ -4,6 +4,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import textwrap
 import threading
 import types
 
@@ -168,9 +169,37 @@ def test_text_that_is_not_unicode_is_refused_by_name(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_waves_faster_than_can_be_followed_are_refused():
+def test_motions_that_no_frame_can_show_are_refused():
     with pytest.raises(ValueError, match="^speed: expected at most 16 wavelengths a frame"):
-        scenes.Scene("waves", speed=1e300)
+        scenes.Scene("waves", speed=1e6)
+    for name, parameter in (("waves", "speed"), ("vortex", "circulation"), ("affine", "u")):
+        with pytest.raises(ValueError, match=f"^{parameter}: expected a number from -1e9 to 1e9, got 1e18"):
+            scenes.Scene(name, **{parameter: 1e18})
+
+
+def test_files_that_may_not_grow_have_the_code_of_the_system(tmp_path):
+    """Nothing is left, and the archive that cannot be ended prints nothing of its own."""
+    pytest.importorskip("resource")
+    script = """
+        import errno, resource, signal, sys
+        import numpy as np
+        import jacoflow
+        frames = [np.random.default_rng(k).integers(0, 256, (60, 80)).astype(np.uint8) for k in range(2)]
+        field = jacoflow.flow(*frames)
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))
+        for name, write in {"x.npz": field.save, "x.y4m": lambda path: jacoflow.io.write_frames(path, frames)}.items():
+            try:
+                write(f"{sys.argv[1]}/{name}")
+            except OSError as error:
+                assert error.errno == errno.EFBIG and error.filename.endswith(name), error
+            else:
+                raise AssertionError(name)
+    """
+    command = [sys.executable, "-c", textwrap.dedent(script), str(tmp_path)]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("array", ["mean", "root", "noise_scale"])

@@ -183,7 +183,11 @@ impl FlowField {
     /// Field `index` of a stack, or the stack of a slice of step 1, sharing its memory. IndexError outside,
     /// TypeError for a single field.
     fn __getitem__(&self, index: &Bound<'_, PyAny>) -> Outcome<Self> {
-        let count = self.__len__()?;
+        if !self.stack {
+            let message = "index: expected a stack of fields, got a single field; its arrays are (H, W, ...)";
+            return Err(PyTypeError::new_err(message).into());
+        }
+        let count = self.count;
         if let Ok(slice) = index.cast::<PySlice>() {
             let range = slice.indices(count as isize)?;
             if range.step != 1 {

@@ -12,6 +12,9 @@ pub use scenes::SCENES;
 use super::{Scene, carried::Carried, motion::Motion, texture::Texture};
 use crate::error::{Error, Result};
 
+/// Largest size of such a number: positions beyond it are not exact to a millionth of a pixel.
+const MAX_PARAMETER: f64 = 1e9;
+
 /// A number that a scene or carrier can be given.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameter {
@@ -166,12 +169,12 @@ impl<'a> Settings<'a> {
             return Err(Error::argument("origin", "finite coordinates", format!("{:?}", options.origin)));
         }
         for (name, value) in &options.values {
-            if !known.iter().any(|p| p.name == name) {
+            let Some(parameter) = known.iter().find(|p| p.name == name) else {
                 let names: Vec<_> = known.iter().map(|p| p.name).collect();
                 return Err(Error::argument("parameter", format!("one of {}", names.join(", ")), name));
-            }
-            if !value.is_finite() {
-                return Err(Error::argument("parameter", format!("a finite {name}"), value));
+            };
+            if value.is_nan() || value.abs() > MAX_PARAMETER {
+                return Err(Error::argument(parameter.name, "a number from -1e9 to 1e9", format!("{value:e}")));
             }
         }
         Ok(Self { options, known })
