@@ -124,7 +124,7 @@ ablation: $(BIN)/maturin
 	rm -rf target/wheels-ablation
 	$(BIN)/maturin build -q --release --features ablation --out target/wheels-ablation -i $(BIN)/python
 	$(VENV)-ablation/bin/python -m pip install -q --force-reinstall --no-deps target/wheels-ablation/jacoflow-*.whl
-	$(VENV)-ablation/bin/python -m pip install -q "jacoflow[bench] @ file://$$(ls $(CURDIR)/target/wheels-ablation/jacoflow-*.whl)"
+	$(VENV)-ablation/bin/python -m pip install -q "jacoflow[test] @ file://$$(ls $(CURDIR)/target/wheels-ablation/jacoflow-*.whl)"
 	$(VENV)-ablation/bin/python -m benchmarks.ablation $(ARGUMENTS)
 
 # API reference from the docstrings: target/doc/jacoflow (Rust), target/doc/python (Python); and README's picture.

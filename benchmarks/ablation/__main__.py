@@ -7,8 +7,9 @@ Needs jacoflow built with the feature `ablation`. Every run is a child process o
 environment variable JACOFLOW_WITHOUT; `--jobs` of them run at once. `--keep` names a JSON file: runs that it
 holds are not repeated, new ones are added to it. The difference is "without minus with", paired by scene or
 seed, with its standard error. Verdict: a heuristic `pays` if some row is worse without it by more than two
-standard errors; it `harms` if none is worse and some row is better by as much; else it has `no effect`. Times
-(`ms`) are shown only: the runs of a pair lie minutes apart, and what else the machine does differs.
+standard errors, or if a test fails that passes with it (row `tests`); it `harms` if none is worse and some
+row is better by as much; else it has `no effect`. Times (`ms`) are shown only: the runs of a pair lie minutes
+apart, and what else the machine does differs.
 """
 
 from __future__ import annotations
@@ -143,7 +144,7 @@ def comparison(with_it: Values, without: Values, larger_is_better: Sequence[str]
         differences = [b - a for a, b in zip(before, after, strict=True)]
         mean, error = report.mean_and_error(differences)
         loss = -mean if name in larger_is_better else mean
-        is_clear = abs(mean) > THRESHOLD * error
+        is_clear = abs(mean) > THRESHOLD * error or name == "tests" and mean < 0
         effect = ("worse" if loss > 0 else "better") if is_clear else "-"
         ends = {"with": report.mean_and_error(before)[0], "without": report.mean_and_error(after)[0]}
         rows.append(

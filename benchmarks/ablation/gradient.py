@@ -1,6 +1,6 @@
 """The gradient tracker on scenes with exact truth and, with JACOFLOW_DATA, on recordings: share of frames
-found, time; of discs whose boxes hold background the greatest errors of the position, px, and over their
-standard deviations."""
+found, outcomes of tests, time; of discs whose boxes hold background the greatest errors of the position, px,
+and over their standard deviations."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 import jacoflow
+from benchmarks.ablation import outcomes
 from benchmarks.rivals.trackers import ours
 from benchmarks.scenes import tracking as scenes
 from benchmarks.scenes import tracking_begin, tracking_hard, tracking_recordings
@@ -20,8 +22,13 @@ from benchmarks.scores.tracking import scores
 
 LARGER_IS_BETTER = (
     "hard", "simulations", "twins", "two planes", "start boxes", "small boxes", "bars", "fences", "half hidden",
-    "jumps", "recordings",
+    "jumps", "light", "recordings", "tests",
 )  # fmt: skip
+TESTS = (
+    "test_track.py", "test_track_begin.py", "test_track_covered.py", "test_track_edges.py", "test_track_limits.py",
+    "test_track_parts.py", "test_track_parts_hidden.py", "test_masked_tracking.py", "test_tracking_scenes.py",
+)  # fmt: skip
+"""Tests of the tracker."""
 SEED = 4000
 """Added to the seeds of the backgrounds; no table uses these."""
 BACKGROUND = 64
@@ -84,6 +91,19 @@ def tested() -> Iterator[tuple[str, Scene]]:
             yield "jumps", scene
 
 
+LIT = 8
+"""Scenes whose light changes."""
+LIGHT: dict[str, tuple[float, float]] = {"darker": (0.5, 0.0), "brighter": (1.4, 0.0), "a higher level": (1.0, 60.0)}
+"""Gain, and offset in grey levels, of the second half of a recording."""
+
+
+def in_other_light(frames: NDArray[np.uint8], gain: float, offset: float) -> NDArray[np.uint8]:
+    """Frames whose light changes in the middle."""
+    half = len(frames) // 2
+    later = np.clip(np.rint(gain * frames[half:].astype(float) + offset), 0, 255).astype(np.uint8)
+    return np.concatenate([frames[:half], later])
+
+
 def of_disc(kind: str, speed: float) -> tuple[float, float]:
     """Greatest error of the position of a disc, px, and over its standard deviation, after the first
     frames."""
@@ -102,6 +122,11 @@ def rows() -> dict[str, list[float]]:
         figures = scores(tracker.run(scene.frames(), scene.start_box), Truth.of(scene))
         found.setdefault(row, []).append(figures["success"])
         found["ms"].append(figures["milliseconds"])
+    for scene in list(scenes.simulations())[:LIT]:
+        for light in LIGHT.values():
+            frames = in_other_light(np.asarray(unseen(scene).frames()), *light)
+            success = scores(tracker.run(frames, scene.start_box), Truth.of(scene))["success"]
+            found.setdefault("light", []).append(success)
     for kind in DISC_KINDS:
         for speed in (0.4, 0.8, 1.2, 2.0):
             error, deviations = of_disc(kind, speed)
@@ -112,4 +137,5 @@ def rows() -> dict[str, list[float]]:
             if not isinstance(each, str):
                 figures = scores(tracker.run(each.frames, each.start_box), each.truth)
                 found.setdefault("recordings", []).append(figures["mean_overlap"])
+    found["tests"] = outcomes.passed(*TESTS)
     return found

@@ -1,5 +1,5 @@
 """The particle tracker on recordings of the ten synthetic scenes and of people and joggers: targets kept,
-overlap, time.
+overlap, outcomes of tests, time.
 
 JACOFLOW_ABLATION=quick takes the three hardest scenes and no recordings.
 """
@@ -13,12 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.ablation import outcomes
 from benchmarks.rivals.particle import Sequence, Settings
 from benchmarks.scenes import particle_recordings
 from benchmarks.scores.particle import ended_at_truth, multiple_object, overlaps, success
 from jacoflow import scenes
 
-LARGER_IS_BETTER = ("kept", "overlap", "recordings, overlap", "campus, MOTA", "campus, IDF1")
+LARGER_IS_BETTER = ("kept", "overlap", "recordings, overlap", "campus, MOTA", "campus, IDF1", "tests")
 RECORDINGS = (31, 32)
 """Seeds of the synthetic recordings; none of them is used elsewhere."""
 SEEDS = (0, 1, 2)
@@ -39,6 +40,7 @@ def rows() -> dict[str, list[float]]:
     """One value for each synthetic target, for each target of a real recording and seed."""
     contestant = Settings("improved", "improved").contestant()
     found: dict[str, list[float]] = {"kept": [], "overlap": [], "ms": []}
+    found["tests"] = outcomes.passed("test_particle_track.py")
     for sequence in sequences():
         begun = time.process_time()
         boxes = contestant.follow(sequence, 0)
@@ -49,7 +51,7 @@ def rows() -> dict[str, list[float]]:
     data = os.environ.get("JACOFLOW_DATA")
     if data is None or os.environ.get("JACOFLOW_ABLATION") == "quick":
         return found
-    found |= {name: [] for name in LARGER_IS_BETTER[2:]}
+    found |= {name: [] for name in LARGER_IS_BETTER[2:5]}
     for sequence in particle_recordings.single(Path(data)):
         for seed in SEEDS:
             shares = overlaps(contestant.follow(sequence, seed), sequence.boxes)

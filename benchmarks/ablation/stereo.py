@@ -1,4 +1,5 @@
-"""The stereo tracker on random sequences of people who cross or are hidden: clusters, tracks, motion, time.
+"""The stereo tracker on random sequences of people who cross or are hidden: clusters, tracks, motion,
+outcomes of tests, time.
 
 JACOFLOW_ABLATION=quick takes four sequences of each kind instead of ten.
 """
@@ -10,9 +11,12 @@ import time
 
 import numpy as np
 
+from benchmarks.ablation import outcomes
 from benchmarks.tables.stereo_tracking_chance import KINDS, comings_back, labels, scored
 
-LARGER_IS_BETTER = ("purity", "recall", "path", "kept", "recognised")
+LARGER_IS_BETTER = ("purity", "recall", "path", "kept", "recognised", "tests")
+TESTS = ("test_stereo_track.py", "test_stereo_track_scenes.py")
+"""Tests of the tracker."""
 FIRST_SEED = 300
 """Of the sequences; none of them is used elsewhere."""
 
@@ -56,4 +60,5 @@ def rows() -> dict[str, list[float]]:
             )
             found["depth error"].append(float(np.mean([error[2] for error in errors])) if errors else 0.0)
             found["short tracks"].append(scores.short_tracks())
+    found["tests"] = outcomes.passed(*TESTS)
     return found

@@ -119,8 +119,7 @@ impl Target {
             let factors = Factors { velocity, ..Factors::none(context.bins.size()) };
             return factors.log_likelihoods(particles);
         }
-        let gain = colour_gain(context.options.mode)
-            * (1.0 - if crate::ablation::keeps("particle.likeness") { prediction.likeness } else { 0.0 });
+        let gain = colour_gain(context.options.mode) * (1.0 - prediction.likeness);
         let distances = prediction.near.iter().filter(|_| on.distance).map(|&other| {
             let other = context.predictions[other].place;
             DistanceFactor { other, square: distance(place, other).powi(2) }

@@ -108,9 +108,6 @@ pub(super) fn apply_measurement(state: &mut State, found: &Finding, frame: &Fram
     };
     if !occluded && score.visibility >= least {
         learn_from(state, frame, aligned.gain, score.visibility);
-    } else if crate::ablation::keeps("gradient.learn_fresh") && state.target.fresh.is_some() {
-        let view = view(frame, &state.target, &state.background, &state.motion.pose);
-        learn::learn_fresh(&mut state.target, &view, aligned.gain, state.scene.noise);
     }
 }
 

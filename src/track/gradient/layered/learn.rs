@@ -46,7 +46,7 @@ pub(super) fn learn_target(target: &mut Target, view: &View, gain: f64, noise: f
 }
 
 /// Brightness of points hidden at first: the mean of what is seen of them, until they are known as well.
-pub(super) fn learn_fresh(target: &mut Target, view: &View, gain: f64, noise: f64) {
+fn learn_fresh(target: &mut Target, view: &View, gain: f64, noise: f64) {
     let Some(mut fresh) = target.fresh.take() else { return };
     let least = 4.0 * noise + 6.0;
     let (width, height) = fresh.size();
