@@ -68,6 +68,7 @@ RATES = "Rates of large steps"
 UNRELATED = "Unrelated frames"
 WAVES = "Turning waves"
 COARSE = "Shifts of coarse texture"
+CODED = "Shifts through coders of video"
 TWO_MOTIONS = "Two motions in a region"
 NOISE = "Noise of a pair"
 METHODS = "Turning by method"
@@ -151,6 +152,13 @@ def turning_waves(record: Record) -> list[str]:
 def coarse_shifts(record: Record) -> list[str]:
     """The same of texture with coarse parts, by the shift."""
     return held(record.sections[COARSE], "shift, px")
+
+
+def coded(record: Record) -> list[str]:
+    """Errors of shifts through the coders of video."""
+    names = ("ok", "error, px", "std, px", "error of the mean, px")
+    body = [[str(row["coder"]), *(number(row.get(name), 3) for name in names)] for row in record.sections[CODED]]
+    return lines(["coder", *names], body)
 
 
 def held(rows: Rows, motion: str) -> list[str]:
@@ -349,6 +357,7 @@ TABLES: dict[str, tuple[Callable[[Record], list[str]], tuple[str, ...]]] = {
     "two_motions": (two_motions, (TWO_MOTIONS,)),
     "turning_discs": (turning_discs, (DISCS,)),
     "noise": (noise, (NOISE,)),
+    "coded": (coded, (CODED,)),
     "other_methods": (other_methods, (METHODS,)),
     "parts": (parts, (FILTER, "Weighted mixtures, a round")),
 }

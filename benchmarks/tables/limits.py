@@ -6,7 +6,9 @@ small an object, and how much noise there may be.
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,11 @@ from benchmarks import report
 from benchmarks.rivals import flow as rivals
 from benchmarks.scenes import recordings as samples
 from benchmarks.scenes import steps
+
+try:
+    import av
+except ImportError:
+    av = None
 
 Row = dict[str, object]
 TURNS, ENLARGEMENTS, SHIFTS = (5, 10, 15, 20, 30), (1.05, 1.1, 1.2, 1.3, 1.5), (8, 16, 32, 48, 64)
@@ -33,6 +40,15 @@ SQUARE = (40, 40, 81, 81)
 """The region that is measured."""
 MARGIN = 24
 """Pixels at the edges that are left out."""
+CODERS: dict[str, tuple[str | None, dict[str, str]]] = {
+    "none": (None, {}),
+    "Motion JPEG": ("mjpeg", {"qmin": "3", "qmax": "3"}),
+    "H.264, crf 6": ("libx264", {"crf": "6"}),
+    "H.264, crf 18": ("libx264", {"crf": "18"}),
+    "H.264, crf 23": ("libx264", {"crf": "23"}),
+}
+"""Row -> name of the coder, and its options."""
+CODED_SHIFTS = (0.4, 0.8, 2.3)
 METHODS = {"coarse_to_fine": "curl", "windowed": "curl", "flow filter": "curl", "lucas_kanade": "u"}
 """Method -> what is measured of its field; the last has no slopes."""
 TRUTH, FILTERED, INNER = {"curl": 0.02, "u": 0.2}, 40, (13, 10, 70, 52)
@@ -247,6 +263,47 @@ def noise(seeds: tuple[int, ...]) -> list[Row]:
     return rows
 
 
+def coded(seeds: tuple[int, ...]) -> list[Row]:
+    """Shifts by parts of a pixel through the coders of video, by `measure` of a square: errors of a step and
+    of the mean of four, px, with the stated standard deviation of a step; root mean squares. Rows whose coder
+    is not installed are left out."""
+    rows: list[Row] = []
+    for coder, (name, options) in CODERS.items():
+        if name is not None and (av is None or name not in av.codecs_available):
+            continue
+        step, mean, std, count = [], [], [], 0
+        for seed in seeds:
+            for shift in CODED_SHIFTS:
+                picture, rng = steps.waves(seed), np.random.default_rng(seed)
+                frames = [eight_bit(steps.moved(picture, np.eye(2), (k * shift, 0.0)), 1.0, rng) for k in range(6)]
+                if name is not None:
+                    frames = through(name, options, frames)
+                found = [jacoflow.flow(*frames[k : k + 2]).measure("u", SQUARE) for k in range(1, 5)]
+                known = [each for each in found if each.status == "ok"]
+                count += len(found)
+                step += [each.value - shift for each in known]
+                std += [each.std for each in known]
+                mean += [float(np.mean([each.value for each in known])) - shift] if known else []
+        shares: Row = {"coder": coder, "ok": len(step) / count}
+        rows.append(shares | {"error, px": _rms(step), "std, px": _rms(std), "error of the mean, px": _rms(mean)})
+    return rows
+
+
+def through(name: str, options: dict[str, str], frames: list[NDArray[np.uint8]]) -> list[NDArray[np.uint8]]:
+    """Frames as they come back from a coder."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "film.mkv"
+        with av.open(str(path), "w") as container:
+            stream = container.add_stream(name, rate=25, options=options)
+            stream.width, stream.height = steps.SIZE, steps.SIZE
+            stream.pix_fmt = "yuvj420p" if name == "mjpeg" else "yuv420p"
+            for frame in frames:
+                shown = av.VideoFrame.from_ndarray(frame, format="gray").reformat(format=stream.pix_fmt)
+                container.mux(stream.encode(shown))
+            container.mux(stream.encode())
+        return [np.asarray(frame, dtype=np.uint8) for frame in jacoflow.io.frames(path)]
+
+
 def other_methods(seeds: tuple[int, ...]) -> list[Row]:
     """What `measure` says of a region of fine texture that turns, by the method of the field: value, its
     standard deviation and that of the values, as shares of the truth."""
@@ -285,6 +342,7 @@ TABLES = {
     "two_motions": report.Table("Two motions in a region", lambda o: two_motions(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "turning_discs": report.Table("Turning discs", lambda o: turning_discs(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "noise": report.Table("Noise of a pair", lambda o: noise(SEEDS[: 1 if o.quick else len(SEEDS)])),
+    "coded": report.Table("Shifts through coders of video", lambda o: coded(SEEDS[: 1 if o.quick else len(SEEDS)])),
     "other_methods": report.Table("Turning by method", lambda o: other_methods(SEEDS[: 1 if o.quick else len(SEEDS)])),
 }
 
