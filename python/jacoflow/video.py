@@ -136,15 +136,17 @@ class Video:
         return int(count) if count else None
 
     def timed(self) -> Iterator[tuple[float | None, NDArray[Any]]]:
-        """The frames with their time in s since the start of the video (None where the file has none): pairs
-        (time, array (H, W))."""
-        stream = self._stream
+        """The frames with their time in s since the first frame of the video (None where the file has none):
+        pairs (time, array (H, W))."""
+        stream, begun = self._stream, None
         if self._stop is not None and self._stop <= self._start:
             return
         try:
             for index, frame in enumerate(self._decoded(stream)):
+                begun = frame.time if index == 0 else begun
                 if index >= self._start and (index - self._start) % self._step == 0:
-                    yield frame.time, _coded.upright(self._image(frame), frame)
+                    time = None if frame.time is None or begun is None else frame.time - begun
+                    yield time, _coded.upright(self._image(frame), frame)
                 if self._stop is not None and index + 1 >= self._stop:
                     return
         except self._av.FFmpegError as error:
