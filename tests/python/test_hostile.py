@@ -202,6 +202,13 @@ def test_files_that_may_not_grow_have_the_code_of_the_system(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_single_field_has_no_index():
+    field = jacoflow.flow(*FRAMES[:2])
+    for index in (0, "u", slice(2)):
+        with pytest.raises(TypeError, match="^index: expected a stack of fields, got a single field"):
+            field[index]
+
+
 @pytest.mark.parametrize("array", ["mean", "root", "noise_scale"])
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e308])
 def test_states_that_no_filter_leaves_are_refused(array, value, tmp_path):
