@@ -144,8 +144,10 @@ def comparison(with_it: Values, without: Values, larger_is_better: Sequence[str]
         differences = [b - a for a, b in zip(before, after, strict=True)]
         mean, error = report.mean_and_error(differences)
         loss = -mean if name in larger_is_better else mean
-        is_clear = abs(mean) > THRESHOLD * error or name == "tests" and mean < 0
+        is_clear = abs(mean) > THRESHOLD * error
         effect = ("worse" if loss > 0 else "better") if is_clear else "-"
+        if name == "tests":
+            effect = "worse" if min(differences, default=0.0) < 0 else "-"
         ends = {"with": report.mean_and_error(before)[0], "without": report.mean_and_error(after)[0]}
         rows.append(
             {

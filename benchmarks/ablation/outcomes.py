@@ -25,9 +25,11 @@ class Recorder:
 
 
 def passed(*names: str) -> list[float]:
-    """Whether each test of the files passes, 1 or 0."""
+    """Whether each test of the files passes, 1 or 0. RuntimeError where they cannot be run."""
     recorder = Recorder()
     files = [str(TESTS / name) for name in names]
     with contextlib.redirect_stdout(sys.stderr):
-        pytest.main(["-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", *files], plugins=[recorder])
+        code = pytest.main(["-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", *files], plugins=[recorder])
+    if code not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
+        raise RuntimeError(f"tests: expected to run {', '.join(names)}, got exit status {code}")
     return recorder.passed

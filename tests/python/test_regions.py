@@ -379,3 +379,24 @@ def test_the_binary_measures_the_parameters_too(tmp_path):
         assert (row["unit"], row["status"]) == (found.unit, "ok")
     refused = subprocess.run([*command[:6], "foo"], capture_output=True, text=True, check=False)
     assert refused.returncode == 2 and "quantity: expected one of u, v, u_x" in refused.stderr
+
+
+@pytest.mark.parametrize(
+    ("quantity", "step", "expected"),
+    [
+        ("angular_velocity", turn(np.radians(15)), np.radians(15)),
+        ("divergence", 1.2 * np.eye(2), 2 * np.log(1.2)),
+        *(("time_to_contact", frames, frames) for frames in (59.0, 9.0, 4.0)),
+    ],
+)
+def test_the_binary_has_the_rates_of_large_steps(quantity, step, expected, tmp_path):
+    """To a thousandth, or within what is stated: of pairs and of three frames."""
+    powers = [np.linalg.matrix_power(step, k) if np.ndim(step) else np.eye(2) * step / (step - k) for k in (-1, 0, 1)]
+    np.save(tmp_path / "frames.npy", [moved(PICTURE, power) for power in powers])
+    command = [sys.executable, "-m", "jacoflow", "measure", str(tmp_path / "frames.npy"), "--quantity", quantity, "--disc", "80,80,45"]
+    for more in ([], ["--time-scheme", "pair", "--start", "1"]):
+        done = subprocess.run([*command, *more], capture_output=True, text=True, check=True)
+        (row,) = csv.DictReader(done.stdout.splitlines())
+        error = abs(float(row["value"]) - expected)
+        allowed = 1e-3 * expected if np.ndim(step) else max(4 * float(row["std"]), 1e-3 * expected)
+        assert row["status"] == "ok" and error < allowed and float(row["std"]) < 0.1 * expected, row
