@@ -15,12 +15,15 @@ use std::iter::once;
 const SEARCHED: usize = 400;
 const SAMPLES: usize = 100;
 
-/// Points after which a sum is compared.
-const PART: usize = 4 * ALIGN;
+/// Groups of points after which a sum is compared.
+const PART: usize = 4;
 
-/// Residuals `(c - q . w)` of one direction, in units of their bounds, as planes `q_x, q_y, q_z, c`.
+/// `q_x, q_y, q_z, c` of the residuals `c - q . w` of a group of points.
+type Group = [[f64; ALIGN]; 4];
+
+/// Residuals of one direction, in units of their bounds.
 struct TruncatedCost<'a> {
-    rows: &'a [Vec<f64>; 4],
+    groups: &'a [Group],
     rotations: &'a [Vector3<f64>],
 }
 
@@ -29,23 +32,27 @@ impl Kernel<f64> for TruncatedCost<'_> {
     /// The rotation with the least `sum min(e^2, 1)`, and that.
     #[inline(always)]
     fn run<V: Lanes<Scalar = f64>>(self) -> Option<(usize, f64)> {
-        let (length, cut2) = (self.rows[0].len(), V::constant(1.0));
+        let cut2 = V::constant(1.0);
         let mut best: Option<(usize, f64)> = None;
         for (index, w) in self.rotations.iter().enumerate() {
             let (wx, wy, wz) = (V::splat(w.x), V::splat(w.y), V::splat(w.z));
-            let (mut sum, mut cost) = (V::zero(), 0.0);
+            // Two sums, as one would wait for itself at every step.
+            let (mut sums, mut cost) = ([V::zero(); 2], 0.0);
             // Sums only grow: those above the least are not completed.
-            for part in (0..length).step_by(PART) {
-                let end = length.min(part + PART);
-                let [x, y, z, c] = self.rows.each_ref().map(|row| row[part..end].chunks_exact(V::LANES));
-                for (((x, y), z), c) in x.zip(y).zip(z).zip(c) {
-                    let rest = V::load(x).neg_mul_add(wx, V::load(c));
-                    let rest = V::load(y).neg_mul_add(wy, rest);
-                    let rest = V::load(z).neg_mul_add(wz, rest);
-                    sum = sum + (rest * rest).min(cut2);
+            for part in self.groups.chunks(PART) {
+                for [x, y, z, c] in part {
+                    for both in (0..ALIGN).step_by(2 * V::LANES) {
+                        for (half, sum) in sums.iter_mut().enumerate() {
+                            let at = both + half * V::LANES;
+                            let rest = V::load(&x[at..]).neg_mul_add(wx, V::load(&c[at..]));
+                            let rest = V::load(&y[at..]).neg_mul_add(wy, rest);
+                            let rest = V::load(&z[at..]).neg_mul_add(wz, rest);
+                            *sum = *sum + (rest * rest).min(cut2);
+                        }
+                    }
                 }
                 let mut lanes = [0.0; ALIGN];
-                sum.store(&mut lanes[..V::LANES]);
+                (sums[0] + sums[1]).store(&mut lanes[..V::LANES]);
                 cost = lanes[..V::LANES].iter().sum();
                 if best.is_some_and(|(_, least)| cost >= least) {
                     break;
@@ -70,28 +77,29 @@ fn search(observations: &Observations, least: f64, spacing: f64, rng: CounterRng
     let (floor, level) = (observations.floor, observations.level);
     let bounds: Vec<f64> = few.iter().map(|row| least.max(spacing * row.f.norm())).collect();
     evaluate(|u| {
-        let length = few.len().next_multiple_of(ALIGN);
-        let mut rows: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; length]);
+        let mut groups: Vec<Group> = vec![[[0.0; ALIGN]; 4]; few.len().div_ceil(ALIGN)];
         for (k, row) in few.iter().enumerate() {
             let t = row.g * u;
             let s2 = t.norm_squared();
             if s2 > floor {
                 let scale = 1.0 / (s2.sqrt() * bounds[k]);
-                for j in 0..3 {
-                    rows[j][k] = (t.y * row.r[(0, j)] - t.x * row.r[(1, j)]) * scale;
+                let [q @ .., c] = &mut groups[k / ALIGN];
+                for (j, q) in q.iter_mut().enumerate() {
+                    q[k % ALIGN] = (t.y * row.r[(0, j)] - t.x * row.r[(1, j)]) * scale;
                 }
-                rows[3][k] = (t.y * row.f.x - t.x * row.f.y) * scale;
+                c[k % ALIGN] = (t.y * row.f.x - t.x * row.f.y) * scale;
             }
         }
+        let value = |j: usize, k: usize| groups[k / ALIGN][j][k % ALIGN];
         let rotation = |three: &[usize; 3]| {
-            let a = Matrix3::from_fn(|i, j| rows[j][three[i]]);
-            let b = Vector3::from_fn(|i, _| rows[3][three[i]]);
+            let a = Matrix3::from_fn(|i, j| value(j, three[i]));
+            let b = Vector3::from_fn(|i, _| value(3, three[i]));
             let w = a.try_inverse()? * b;
             w.iter().all(|value| value.is_finite()).then_some(w)
         };
         let known = observations.prior.map(|known| known.rotation);
         let rotations: Vec<Vector3<f64>> = triples.iter().filter_map(rotation).chain(known).collect();
-        let (best, cost) = dispatch(level, TruncatedCost { rows: &rows, rotations: &rotations })?;
+        let (best, cost) = dispatch(level, TruncatedCost { groups: &groups, rotations: &rotations })?;
         Some((Motion::of(u, &rotations[best]), cost))
     })
 }
