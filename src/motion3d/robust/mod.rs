@@ -101,7 +101,7 @@ pub(crate) fn consensus(whitening: &Whitening<'_>, scaled: &mut Scaled, rng: Cou
         let on = search_sample(&scaled.observations, rng);
         let inliers = inliers_of(&on, &found.motion);
         let inliers = if on.n == scaled.observations.n { &found.inliers } else { &inliers };
-        found.competing.extend(two_motions::competing_motion(&on, &found.motion, inliers, rng));
+        found.competing.extend(two_motions::competing_motion(&on, &found.motion, inliers, scaled.unknown, rng));
     }
     Some(found)
 }

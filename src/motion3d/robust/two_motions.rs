@@ -24,16 +24,19 @@ const LITTLE: f64 = 0.25;
 /// Parts of the picture from which two motions are looked for.
 const PARTS: usize = 4;
 
-/// What two motions must explain more than one: twice the unknowns of one more, and which points have it. And
-/// of each point, where that of more points is the same: errors of flow that go together look like the motion
-/// of a few.
-const ALL: f64 = 20.0;
-const EACH: f64 = 0.12;
+/// What two motions must explain more than one if that of more points has another direction: twice the unknowns
+/// of one more, and which points have it.
+const ANOTHER: f64 = 20.0;
+
+/// What they must explain more wherever their directions are, if the noise was given: so many unknowns, the
+/// second motion's own and the place and size of its region, each times `ln n` (G. Schwarz 1978). Where noise
+/// hides the difference both fits stay near the third motion that they share, although neither the scene nor
+/// the object has it. Unknown noise may be errors that go together, which look like this.
+const ADDED: f64 = 8.0;
 
 /// Returns what may be the scene's motion instead of `found` if its inliers `points` have structured
-/// residuals: if two motions explain them better, that of more points, or of fewer, if it is another one.
-/// `None` if the gain is too small for another motion, as with correlated errors that are given as
-/// independent.
+/// residuals: if two motions explain them better, that of more points if it is another one, else the farther.
+/// `None` if the gain is too small for another motion. `unknown`: the noise was not given.
 ///
 /// A third motion between those of an object and the scene may have more inliers than the scene's motion
 /// alone, and every search may end there; but it leaves residuals in both.
@@ -41,6 +44,7 @@ pub(crate) fn competing_motion(
     observations: &Observations,
     found: &Motion,
     points: &[u32],
+    unknown: bool,
     rng: CounterRng,
 ) -> Option<Alternative> {
     let parts = deviating_parts(observations, found, points)?;
@@ -53,12 +57,16 @@ pub(crate) fn competing_motion(
         .take(PARTS)
         .filter_map(divided)
         .min_by(|a: &TwoMotionFit, b: &TwoMotionFit| a.cost.total_cmp(&b.cost))?;
-    let another = |motion: &&Motion| motion.angle_to(found).to_degrees() > APART;
-    let gain = together - two.cost;
-    let [more, fewer] = &two.motions;
-    let motion = Some(more).filter(another).or_else(|| Some(fewer).filter(another).filter(|_| gain > EACH * n))?;
-    let excess = truncated(observations, motion, INLIER) - truncated(observations, found, INLIER);
-    (gain > ALL).then(|| Alternative { motion: *motion, excess: excess.max(0.0) })
+    let [more, fewer] = two.motions;
+    let [turned, turned_fewer] = [more, fewer].map(|motion| motion.angle_to(found));
+    let is_another = turned.to_degrees() > APART;
+    let needed = if is_another { ANOTHER } else { ADDED * n.ln() };
+    if together - two.cost <= needed || (unknown && !is_another) {
+        return None;
+    }
+    let motion = if is_another || turned > turned_fewer { more } else { fewer };
+    let excess = truncated(observations, &motion, INLIER) - truncated(observations, found, INLIER);
+    Some(Alternative { motion, excess: excess.max(0.0) })
 }
 
 /// The smallest parts, as a share of the points, and the fewest points of one.
