@@ -180,10 +180,7 @@ impl TrackAssociation {
             if lost(k)
                 && let Some(track) = self.live[k].take()
             {
-                // A track without a steady motion cannot be predicted.
-                if track.steady > 0 || !crate::ablation::keeps("stereo.never_steady") {
-                    self.lost.push(LostTrack { track, since });
-                }
+                self.lost.push(LostTrack { track, since });
             }
         }
     }

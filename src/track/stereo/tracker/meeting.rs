@@ -38,30 +38,18 @@ impl StereoTracker {
     }
 }
 
-/// Overlaps of moved clusters forwards, and backwards by the same motions: the cluster's own or, without an
-/// overlap, that of the cluster that covers it most.
+/// Overlaps of moved clusters forwards, and backwards by the same motions.
 fn both_ways(before: &Clusters, after: &Clusters, motions: &[Option<ClusterMotion>]) -> Overlaps {
-    let nobody = vec![0.0; before.components()];
-    let forward: Vec<Row> = (0..before.components())
+    let forward = (0..before.components())
         .map(|k| match motions[k] {
             Some(motion) => moved_overlaps(before, k, after, |i| motion.moved(before.points.at(i))),
             None => vec![0.0; after.components()],
         })
         .collect();
-    let back = |k: usize, motion: &Option<ClusterMotion>| match motion {
-        Some(motion) => moved_overlaps(after, k, before, |i| motion.moved_back(after.points.at(i))),
-        None => nobody.clone(),
-    };
     let backward = (0..after.components())
-        .map(|k| {
-            let own = back(k, motions.get(k).unwrap_or(&None));
-            if !crate::ablation::keeps("stereo.back_by_covering") || own.get(k).is_some_and(|share| *share > 0.0) {
-                return own;
-            }
-            let covering = (0..before.components())
-                .filter(|&j| forward[j][k] > 0.0)
-                .max_by(|&i, &j| forward[i][k].total_cmp(&forward[j][k]).then(j.cmp(&i)));
-            covering.map_or(own, |j| back(k, &motions[j]))
+        .map(|k| match motions.get(k).copied().flatten() {
+            Some(motion) => moved_overlaps(after, k, before, |i| motion.moved_back(after.points.at(i))),
+            None => vec![0.0; before.components()],
         })
         .collect();
     (forward, backward)
