@@ -60,7 +60,6 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("stereo.sure_jump", "a jump is believed where it is well supported"),
     ("stereo.trusted_velocity", "the velocity follows measurements by their support"),
     ("stereo.larger_parts", "a mostly covered track passes to a larger part"),
-    ("stereo.part_renamed", "a part that grows is called after the lost whole"),
     ("stereo.thickness", "a recognised object is about as thick as the lost one"),
     ("stereo.size", "a recognised object is not larger than the lost one"),
     ("stereo.covered_position", "the position of a mostly covered track is extrapolated"),

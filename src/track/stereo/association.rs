@@ -209,7 +209,7 @@ impl TrackAssociation {
     }
 
     /// Gives components of at least `least` pixels without a track a matching lost one (largest first, then
-    /// nearest) or a new one; outgrown tracks are matched with older ones. Updates all positions.
+    /// nearest) or a new one. Updates all positions.
     pub fn associate(&mut self, at: Clock, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
         self.lost.retain(|track| {
             limits.is_some_and(|limits| at.now - track.since <= limits.patience as f64 + TIME_TOLERANCE)
@@ -217,15 +217,8 @@ impl TrackAssociation {
         if let Some(limits) = limits {
             let mut pairs = Vec::new();
             for (r, track) in self.lost.iter().enumerate() {
-                let waits_for = |new: &&Sighting| {
-                    let part = |own: &ComponentTrack| {
-                        crate::ablation::keeps("stereo.part_renamed")
-                            && own.born > track.track.born
-                            && own.is_outgrown(new)
-                    };
-                    new.pixels as f64 >= least && self.live[new.component].as_ref().is_none_or(part)
-                };
-                for new in seen.iter().filter(waits_for) {
+                let unnamed = |new: &&Sighting| new.pixels as f64 >= least && self.live[new.component].is_none();
+                for new in seen.iter().filter(unnamed) {
                     if let Some(distance) = track.track.distance(at.now - track.since, new, limits) {
                         pairs.push((new.pixels, distance, r, new.component));
                     }
