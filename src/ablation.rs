@@ -60,8 +60,6 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("stereo.sure_jump", "a jump is believed where it is well supported"),
     ("stereo.trusted_velocity", "the velocity follows measurements by their support"),
     ("stereo.larger_parts", "a mostly covered track passes to a larger part"),
-    ("stereo.thickness", "a recognised object is about as thick as the lost one"),
-    ("stereo.size", "a recognised object is not larger than the lost one"),
     ("stereo.covered_position", "the position of a mostly covered track is extrapolated"),
     ("stereo.covered_tolerance", "a partly covered object may be farther off"),
     ("stereo.assumed_motion", "overlaps of what was not measured by the last motion or none"),

@@ -1,5 +1,5 @@
 //! Associates components with tracks. A component keeps its track while it covers its moved self; a lost
-//! track is kept for a while and recognised by position, size and thickness.
+//! track is kept for a while and recognised by its position.
 
 use super::clock::Clock;
 
@@ -56,8 +56,8 @@ pub(super) struct ComponentTrack {
     pub position: [f64; 3],
     /// Decaying maximum of the number of edge pixels.
     pub peak: f64,
-    /// Median absolute deviations along x, y and depth when it was last mostly visible, cells and layers.
-    pub spread: [f64; 3],
+    /// Median absolute deviations along x and y when it was last mostly visible, cells.
+    pub spread: [f64; 2],
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,16 +67,13 @@ pub(super) struct Sighting {
     pub position: [f64; 3],
     /// Edge pixels.
     pub pixels: usize,
-    /// Median absolute deviations along x, y and depth, cells and layers; robust against wrong matches.
-    pub spread: [f64; 3],
+    /// Median absolute deviations along x and y, cells; robust against wrong matches.
+    pub spread: [f64; 2],
 }
 
 /// Share of the peak number of pixels below which a track counts as partly covered.
 const COVERED_SHARE: f64 = 0.8;
-/// Tolerance of the thickness of a recognised object: factor, and layers. Occlusion does not change the
-/// extent in depth.
-const THICKNESS_TOLERANCE: (f64, f64) = (2.0, 0.5);
-/// Largest number of pixels of a recognised object over that of the lost one.
+/// Number of pixels over that of a track beyond which it is a part of what is seen.
 const MAX_GROWTH: f64 = 1.5;
 /// Half the extent of a uniform distribution over its median absolute deviation.
 const HALF_EXTENT: f64 = 2.0;
@@ -256,7 +253,7 @@ impl TrackAssociation {
 
 impl ComponentTrack {
     /// Updates position, number of pixels and spread, `gap` ordinary steps after the last update.
-    fn see(&mut self, (position, pixels, spread): ([f64; 3], f64, [f64; 3]), gap: f64) {
+    fn see(&mut self, (position, pixels, spread): ([f64; 3], f64, [f64; 2]), gap: f64) {
         self.peak = pixels.max(PEAK_DECAY.powf(gap) * self.peak);
         self.position = match self.velocity {
             Some(velocity)
@@ -271,10 +268,9 @@ impl ComponentTrack {
         };
     }
 
-    /// Distance of a component from the predicted position, in tolerances; `None` beyond them or for another
-    /// thickness or size.
+    /// Distance of a component from the predicted position, in tolerances; `None` beyond them.
     fn distance(&self, steps: f64, seen: &Sighting, limits: &Recognition) -> Option<f64> {
-        let velocity = self.velocity.filter(|_| self.resembles(seen))?;
+        let velocity = self.velocity?;
         // The middle of the visible part differs from that of the whole by up to the covered part.
         let covered = 1.0 - (seen.pixels as f64 / self.peak.max(1.0)).min(1.0);
         let mut sum = 0.0;
@@ -297,14 +293,6 @@ impl ComponentTrack {
 
     fn is_outgrown(&self, seen: &Sighting) -> bool {
         seen.pixels as f64 > MAX_GROWTH * self.peak
-    }
-
-    /// Whether the component may be this object, seen wholly or in part.
-    fn resembles(&self, seen: &Sighting) -> bool {
-        let (factor, layers) = THICKNESS_TOLERANCE;
-        let (thinner, thicker) = (self.spread[2].min(seen.spread[2]), self.spread[2].max(seen.spread[2]));
-        (thicker <= factor * thinner + layers || !crate::ablation::keeps("stereo.thickness"))
-            && !(self.is_outgrown(seen) && crate::ablation::keeps("stereo.size"))
     }
 }
 

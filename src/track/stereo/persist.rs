@@ -4,7 +4,7 @@ use super::StereoTracker;
 use crate::error::Result;
 use crate::track::persist::Kind;
 
-const TRACKER: Kind = Kind { mark: *b"JFST", layout: 1, what: "stereo tracker" };
+const TRACKER: Kind = Kind { mark: *b"JFST", layout: 2, what: "stereo tracker" };
 
 impl StereoTracker {
     /// Everything, as bytes: what they give back goes on as this one would, bit for bit.

@@ -54,7 +54,7 @@ impl StereoTracker {
             }
         }
         self.association.live = live;
-        let seen = sightings(clusters, |_| ([0.0; 3], [0.0; 3]));
+        let seen = sightings(clusters, |_| ([0.0; 3], [0.0; 2]));
         self.association.associate(self.clock, &seen, 0.0, None);
     }
 
@@ -166,7 +166,7 @@ impl StereoTracker {
 }
 
 /// All components that have edge pixels; `place`: position and spread of each, cells.
-fn sightings(clusters: &Clusters, place: impl Fn(usize) -> ([f64; 3], [f64; 3])) -> Vec<Sighting> {
+fn sightings(clusters: &Clusters, place: impl Fn(usize) -> ([f64; 3], [f64; 2])) -> Vec<Sighting> {
     let pixels = clusters.pixels.iter().map(Vec::len).enumerate().filter(|(_, pixels)| *pixels > 0);
     let sighting = |(component, pixels)| {
         let (position, spread) = place(component);
@@ -175,9 +175,9 @@ fn sightings(clusters: &Clusters, place: impl Fn(usize) -> ([f64; 3], [f64; 3]))
     pixels.map(sighting).collect()
 }
 
-/// Medians of a cluster's pixels along x, y and depth, and their median absolute deviations, cells and
-/// layers.
-fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 3]) {
+/// Medians of a cluster's pixels along x, y and depth, and their median absolute deviations along x and y,
+/// cells and layers.
+fn middle_and_deviation(clusters: &Clusters, k: usize) -> ([f64; 3], [f64; 2]) {
     let places: Vec<[f64; 3]> =
         clusters.pixels[k].iter().map(|&i| clusters.lattice().cells_of(clusters.points.at(i as usize))).collect();
     let median = |along: &mut dyn Iterator<Item = f64>| median(&mut along.collect::<Vec<_>>()).unwrap_or(f64::NAN);
