@@ -411,6 +411,16 @@ def test_a_track_rests_while_nothing_is_seen():
     assert biggest(after, 5).track_id in {c.track_id for c in before.clusters if abs(c.mean[2] - 5) < 1.5}
 
 
+def test_a_few_edges_where_nothing_was_are_a_scene_of_their_own():
+    tracker = StereoTracker(n_components=6, **SMALL)
+    for left, right in sequence(2):
+        tracker.update(left, right)
+    few = np.full(left.shape, np.nan, np.float32)
+    few[10:110:20, 15] = 1
+    step = tracker.update_disparity(left, few)
+    assert sum(cluster.n_pixels for cluster in step.clusters) == 5
+
+
 @pytest.mark.parametrize("mode", ["improved", "paper"])
 def test_results_do_not_depend_on_threads(mode):
     one, two = followed(mode, threads=1)[0].graph, followed(mode, threads=2)[0].graph
