@@ -83,7 +83,6 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("particle.background_penalty", "background tracks in the box count against a moving target"),
     ("particle.shared_tracks", "tracks in another box are shared by their motion"),
     ("particle.full_tracks", "many own tracks weigh no more than twenty"),
-    ("particle.new_look", "a lasting new look is learned"),
     ("particle.jumping_tracks", "a track that jumps loses its label"),
     ("particle.other_tracks", "a track that moves with another target loses its label"),
     ("particle.doubtful_tracks", "a deviating, doubtful track loses its label"),

@@ -15,7 +15,7 @@ use crate::types::AnyColourFrame;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-const TRACKER: Kind = Kind { mark: *b"JFPT", layout: 3, what: "particle tracker" };
+const TRACKER: Kind = Kind { mark: *b"JFPT", layout: 4, what: "particle tracker" };
 const STEP: Kind = Kind { mark: *b"JFPS", layout: 3, what: "step of a particle tracker" };
 
 #[derive(Serialize, Deserialize)]

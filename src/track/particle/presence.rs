@@ -12,11 +12,6 @@ const GAINS: [f64; 2] = [0.2, 0.1];
 const HIDDEN_SHARE: f64 = 0.25;
 /// Share of a box that another one covers when it may hide it.
 pub(super) const COVER: f64 = 0.5;
-/// A low similarity is a new look of the target, not a cover, with at least this share of the usual number of
-/// tracks and at least this number.
-const NEW_LOOK: (f64, f64) = (0.7, 4.0);
-/// That share after the target was hidden: light may have changed behind the occluder.
-const NEW_LOOK_AFTER: f64 = 0.5;
 /// Number of tracks, and share of the usual number, that make a hidden target seen again.
 const SEEN_AGAIN: (f64, f64) = (4.0, 0.3);
 /// Noise of a hidden target: share at first, and what it grows by in each frame, up to 1.
@@ -37,8 +32,6 @@ pub(super) struct Presence {
     count: usize,
     /// Frames since the target became hidden; 0: it is not.
     hidden: usize,
-    /// Whether it was hidden since it was last clear.
-    was_hidden: bool,
     /// Whether the last similarity was low.
     pub is_low: bool,
     /// Where the target was last clear, moved on by the camera and the usual velocity, px.
@@ -53,7 +46,6 @@ impl Presence {
             tracks: 0.0,
             count: 0,
             hidden: 0,
-            was_hidden: false,
             is_low: false,
             clear_place: place,
         }
@@ -96,14 +88,12 @@ impl Presence {
             && (!crate::ablation::keeps("particle.returning") || (returning as f64) < self.tracks_to_return());
         let entered = hidden && self.hidden == 0;
         self.hidden = if hidden { self.hidden + 1 } else { 0 };
-        self.was_hidden |= hidden;
         entered
     }
 
     /// Hides the target without a decision by its tracks, as after a cut.
     pub fn hide(&mut self) {
         self.hidden += 1;
-        self.was_hidden = true;
     }
 
     /// The target is not hidden any more, or nobody judges it.
@@ -125,16 +115,11 @@ impl Presence {
     /// Updates the usual values by a frame in which the target is seen and nothing is near. Returns whether
     /// the target is clear there.
     pub fn learn(&mut self, similarity: f64, labelled: usize, estimate: &Particle) -> bool {
-        let usual = self.similarity.unwrap_or(similarity);
-        let learned = Some(usual + SIMILARITY_GAIN * (similarity - usual));
         if self.is_low {
-            let share = if self.was_hidden { NEW_LOOK_AFTER } else { NEW_LOOK.0 };
-            if crate::ablation::keeps("particle.new_look") && labelled as f64 >= (share * self.tracks).max(NEW_LOOK.1) {
-                self.similarity = learned;
-            }
             return false;
         }
-        self.similarity = learned;
+        let usual = self.similarity.unwrap_or(similarity);
+        self.similarity = Some(usual + SIMILARITY_GAIN * (similarity - usual));
         self.count += 1;
         let gain = |least: f64| least.max(1.0 / self.count as f64);
         for i in 0..2 {
@@ -142,7 +127,6 @@ impl Presence {
         }
         self.tracks += gain(GAINS[1]) * (labelled as f64 - self.tracks);
         self.clear_place = [estimate[0], estimate[1]];
-        self.was_hidden = false;
         true
     }
 }
