@@ -1,6 +1,6 @@
 """The gradient tracker on scenes with exact truth and, with JACOFLOW_DATA, on recordings: share of frames
 found, outcomes of tests, time; of discs whose boxes hold background the greatest errors of the position, px,
-and over their standard deviations."""
+and over their standard deviations; of start boxes the share of positions within two standard deviations."""
 
 from __future__ import annotations
 
@@ -14,15 +14,17 @@ from numpy.typing import NDArray
 
 import jacoflow
 from benchmarks.ablation import outcomes
-from benchmarks.rivals.trackers import ours
+from benchmarks.rivals.trackers import Tracker, ours
 from benchmarks.scenes import tracking as scenes
-from benchmarks.scenes import tracking_begin, tracking_hard, tracking_recordings
+from benchmarks.scenes import textures, tracking_begin, tracking_hard, tracking_recordings
 from benchmarks.scenes.tracking import TIMES, Plane, Scene, Truth, disc, figure, line, square
+from benchmarks.scenes.tracking_recordings import Recording
 from benchmarks.scores.tracking import scores
 
 LARGER_IS_BETTER = (
     "hard", "simulations", "twins", "two planes", "start boxes", "small boxes", "bars", "fences", "half hidden",
-    "jumps", "light", "recordings", "tests",
+    "jumps", "light", "other sizes, overlap", "first frames, held", "fast starts", "recordings",
+    "recordings, parts", "tests",
 )  # fmt: skip
 TESTS = (
     "test_track.py", "test_track_begin.py", "test_track_covered.py", "test_track_edges.py", "test_track_limits.py",
@@ -33,13 +35,24 @@ SEED = 4000
 """Added to the seeds of the backgrounds; no table uses these."""
 BACKGROUND = 64
 """Seed of backgrounds that belong to this table alone."""
+TWIN_SEEDS = (SEED, 5000, 6000)
+"""Added to the seeds of the backgrounds of twins."""
+SEEDS = range(64, 72)
+"""Seeds of the backgrounds of start boxes whose covariance is looked at, and of targets that change their
+size while they are covered."""
+FAST_SEEDS, FAST_FRAMES = range(64, 704), 26
+"""Seeds of the backgrounds of fast starts, of which few lose the target, and their frames."""
+FIRST = 13
+"""Frames in which a first box may be undecided."""
+PART = 30
+"""Frames of a part of a recording."""
 DISC_KINDS, DISC_RADIUS = ("smooth:4,110,25", "fractal:1,90,30"), 14.0
 """Backgrounds and radius, px, of discs that are alone in their box."""
 
 
-def unseen(scene: Scene) -> Scene:
+def unseen(scene: Scene, seed: int = SEED) -> Scene:
     """The scene before other backgrounds and with other noise."""
-    planes = tuple(replace(plane, seed=plane.seed + SEED) for plane in scene.planes)
+    planes = tuple(replace(plane, seed=plane.seed + seed) for plane in scene.planes)
     return replace(scene, planes=planes, noise_seed=5)
 
 
@@ -61,7 +74,8 @@ def tested() -> Iterator[tuple[str, Scene]]:
     for scene in scenes.simulations():
         yield "simulations", unseen(scene)
     for scene in tracking_hard.crossings():
-        yield "twins", unseen(scene)
+        for seed in TWIN_SEEDS:
+            yield "twins", unseen(scene, seed)
     for seed in range(210, 216):
         yield "two planes", tracking_hard.two_planes(seed)
     for kind in tracking_begin.KINDS:
@@ -89,6 +103,65 @@ def tested() -> Iterator[tuple[str, Scene]]:
         path = line((90.0, 128.0), (1.0, 0.0)) + np.where(TIMES >= 20, jump, 0.0)[:, None] * (1.0, 0.0)
         for scene in covered("jump", square(path)):
             yield "jumps", scene
+
+
+def resized() -> Iterator[Scene]:
+    """A target that changes its size while a bar hides it or a low wall hides its lower half."""
+    count = len(TIMES)
+    bar = figure(np.full((count, 2), (129.5, 127.5)), np.full((count, 2), (40.0, 256.0)), 40.0)
+    wall = figure(np.full((count, 2), (129.5, 138.0)), np.full((count, 2), (70.0, 20.0)), 40.0)
+    for occluder, fall in ((bar, 0.4), (wall, 0.0)):
+        path = line((70.0, 128.0), (2.4, fall))
+        grown = np.clip((path[:, 0] - 97.0) / 65.0, 0.0, 1.0)[:, None]
+        for seed in SEEDS:
+            surface = textures.texture(45, 150.0, 35.0, 2.0, seed)
+            for kind in tracking_begin.KINDS:
+                for factor in (0.8, 1.25):
+                    sides = np.repeat(25.0 * (1.0 + (factor - 1.0) * grown), 2, axis=1)
+                    for target in (figure(path, sides, 200.0), figure(path, sides, 1.0, surface=surface)):
+                        yield Scene("other size", (Plane(kind, seed),), target, others=(occluder,))
+
+
+def of_start_box() -> Iterator[float]:
+    """Shares of the first frames with the centre within two standard deviations along both axes, of targets
+    in boxes of other sides or beside them."""
+    for seed in SEEDS:
+        for kind in tracking_begin.KINDS:
+            for box in tracking_begin.BOXES:
+                for side in (13.0, 21.0):
+                    scene = tracking_begin.stretched(box, side, kind, seed)
+                    found = jacoflow.track.track(scene.frames(), scene.start_box)
+                    errors = np.abs(found.position - scene.centres) / np.sqrt(found.covariance[:, :, 0, 0])
+                    yield float((errors[1:FIRST] <= 2.0).all(axis=1).mean())
+
+
+def of_fast_start(tracker: Tracker, seed: int) -> float:
+    """Share of frames in which a faint target before a rough background is found that moves by 5 px a frame
+    from the first one on."""
+    path = line((60.0, 120.0), (5.0, 0.0))[:FAST_FRAMES]
+    scene = Scene("fast", (Plane("fractal:1,90,30", seed),), square(path, side=21.0, level=115.0))
+    frames = []
+    for t in range(FAST_FRAMES):
+        picture = scene.picture(t)
+        noise = scene.noise * np.random.default_rng((seed, t)).standard_normal(picture.shape)
+        frames.append(np.rint(np.clip(picture + noise, 0.0, 255.0)).astype(np.uint8))
+    truth = Truth(scene.boxes, np.arange(FAST_FRAMES) > 0)
+    return scores(tracker.run(np.stack(frames), scene.start_box), truth)["success"]
+
+
+def parts(recording: Recording) -> Iterator[Recording]:
+    """The recording in parts of `PART` frames that begin where the target has a box."""
+    for first in range(0, len(recording.frames) - PART + 1, PART):
+        boxes = recording.truth.boxes[first : first + PART]
+        known = np.isfinite(boxes).all(axis=1)
+        if known[0]:
+            truth = Truth(boxes, known & (np.arange(PART) > 0))
+            yield Recording(recording.name, recording.frames[first : first + PART], truth)
+
+
+def overlap_of(tracker: Tracker, recording: Recording) -> float:
+    """Mean overlap on a recording."""
+    return scores(tracker.run(recording.frames, recording.start_box), recording.truth)["mean_overlap"]
 
 
 LIT = 8
@@ -127,15 +200,25 @@ def rows() -> dict[str, list[float]]:
             frames = in_other_light(np.asarray(unseen(scene).frames()), *light)
             success = scores(tracker.run(frames, scene.start_box), Truth.of(scene))["success"]
             found.setdefault("light", []).append(success)
+    found["other sizes, overlap"] = [
+        scores(tracker.run(scene.frames(), scene.start_box), Truth.of(scene))["mean_overlap"]
+        for scene in resized()
+    ]
+    found["first frames, held"] = list(of_start_box())
+    found["fast starts"] = [of_fast_start(tracker, seed) for seed in FAST_SEEDS]
     for kind in DISC_KINDS:
         for speed in (0.4, 0.8, 1.2, 2.0):
             error, deviations = of_disc(kind, speed)
             found.setdefault("disc, px", []).append(error)
             found.setdefault("disc, deviations", []).append(deviations)
     if os.environ.get("JACOFLOW_DATA"):
-        for each in tracking_recordings.read_all(Path(os.environ["JACOFLOW_DATA"])):
-            if not isinstance(each, str):
-                figures = scores(tracker.run(each.frames, each.start_box), each.truth)
-                found.setdefault("recordings", []).append(figures["mean_overlap"])
+        data = Path(os.environ["JACOFLOW_DATA"])
+        still = [each for each in tracking_recordings.read_all(data) if not isinstance(each, str)]
+        found["recordings"] = [overlap_of(tracker, each) for each in still]
+        found["recordings, parts"] = [
+            overlap_of(tracker, part)
+            for each in [*still, *tracking_recordings.moving(data)]
+            for part in parts(each)
+        ]
     found["tests"] = outcomes.passed(*TESTS)
     return found

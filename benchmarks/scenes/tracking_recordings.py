@@ -73,6 +73,18 @@ def campus(data: Path) -> Iterator[Recording]:
             yield Recording(f"TUD-Campus {target}", frames[first : last + 1], _truth(known))
 
 
+def moving(data: Path) -> Iterator[Recording]:
+    """Two joggers and a car before a moving camera: folders `track_otb/jogging` and `track_tlp/CarChase2`."""
+    joggers, car = data / "track_otb" / "jogging", data / "track_tlp" / "CarChase2"
+    tracks = [(joggers, read_boxes(path)) for path in sorted(joggers.glob("groundtruth_rect*.txt"))]
+    if (path := car / "groundtruth_rect.txt").exists():
+        tracks.append((car, read_boxes(path)[:, 1:5]))
+    for folder, boxes in tracks:
+        frames = [read_grey(path) for path in sorted((folder / "img").glob("[0-9]*.jpg"))[: len(boxes)]]
+        if frames:
+            yield Recording(folder.name, np.stack(frames), _truth(boxes[: len(frames)]))
+
+
 def _truth(boxes: NDArray[np.floating]) -> Truth:
     """The truth from boxes (T, 4) whose corner is counted from 1, to the corner of the first pixel; NaN
     where there is none."""
