@@ -3,8 +3,6 @@
 #![allow(clippy::too_many_arguments, reason = "keyword options of Python functions")]
 #![allow(clippy::type_complexity, reason = "what __reduce__ must return")]
 
-#[cfg(feature = "ablation")]
-mod ablation;
 mod arrays;
 mod colour_arrays;
 mod command;
@@ -41,12 +39,19 @@ mod track;
 
 use pyo3::prelude::*;
 
+/// Name and purpose of every heuristic that `JACOFLOW_WITHOUT` can switch off, for `benchmarks/ablation`.
+#[cfg(feature = "ablation")]
+#[pyfunction]
+pub fn heuristics() -> Vec<(&'static str, &'static str)> {
+    jacoflow::ablation::HEURISTICS.to_vec()
+}
+
 /// The compiled part of jacoflow. Import `jacoflow` instead.
 #[pymodule(gil_used = false)]
 mod _jacoflow {
     #[cfg(feature = "ablation")]
     #[pymodule_export]
-    use super::ablation::heuristics;
+    use super::heuristics;
     #[cfg(feature = "reference")]
     #[pymodule_export]
     use super::reference_track::{gradient_flow, kernels, mean_flow, tracker};

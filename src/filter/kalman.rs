@@ -1,4 +1,5 @@
-//! The linear filter (R. E. Kalman, "A new approach to linear filtering and prediction problems", 1960).
+//! The linear filter (R. E. Kalman, "A new approach to linear filtering and prediction problems", 1960),
+//! and its update by one number.
 
 use super::checks::{check_finite, expect, shared};
 use super::failures::Failures;
@@ -8,6 +9,7 @@ use super::state::{GaussianState, reach_state};
 use super::update::Measured;
 use crate::error::Result;
 use crate::math::dense::multiply;
+use nalgebra::{RowSVector, SMatrix, SVector};
 
 /// A batch of linear Kalman filters: `x' = F x + w`, `z = H x + v`, `w ~ N(0, Q)`, `v ~ N(0, R)`.
 ///
@@ -121,6 +123,24 @@ pub(super) fn times_roots(A: &[f64], roots: &[f64], (n, rows): (usize, usize)) -
         multiply(shared(A, item, rows * n), root, n, out);
     }
     out
+}
+
+/// Updates state and covariance by a measurement `(z, r)`, value and variance, of `h x`, in Joseph form, for
+/// small states of fixed size on the stack. Returns the normalised innovation squared. Independent
+/// measurements may follow one another.
+pub fn update_by_scalar<const N: usize>(
+    x: &mut SVector<f64, N>,
+    p: &mut SMatrix<f64, N, N>,
+    h: &RowSVector<f64, N>,
+    (z, r): (f64, f64),
+) -> f64 {
+    let innovation = z - (h * *x)[0];
+    let s = (h * *p * h.transpose())[0] + r;
+    let k = *p * h.transpose() / s;
+    *x += k * innovation;
+    let rest = SMatrix::<f64, N, N>::identity() - k * h;
+    *p = rest * *p * rest.transpose() + k * k.transpose() * r;
+    innovation * innovation / s
 }
 
 reach_state!(KalmanFilter);

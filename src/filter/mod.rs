@@ -13,7 +13,7 @@
 //!
 //! `state` (with `update`, `failures`, `checks`) is what `kalman`, `extended` and `unscented` (with
 //! `sigma_points` and `moments`) share, `smoother` too; a [`Manifold`] subtracts and averages angles.
-//! [`particle`] stands alone. `scalar` is the update by one number, for small states on the stack.
+//! [`particle`] stands alone. [`update_by_scalar`] serves small states on the stack.
 //!
 //! ```
 //! use jacoflow::filter::{SigmaPoints, UnscentedFilter};
@@ -49,7 +49,6 @@ mod kalman;
 mod manifold;
 mod moments;
 pub mod particle;
-mod scalar;
 mod sigma_points;
 mod smoother;
 mod state;
@@ -58,9 +57,8 @@ mod update;
 
 pub use checks::{check_covariances, check_dimension, check_mean};
 pub use extended::ExtendedFilter;
-pub use kalman::KalmanFilter;
+pub use kalman::{KalmanFilter, update_by_scalar};
 pub use manifold::{Manifold, Vectors};
-pub use scalar::update_by_scalar;
 pub use sigma_points::SigmaPoints;
 pub use smoother::Smoothed;
 pub use state::GaussianState;

@@ -7,7 +7,6 @@
 mod channels;
 mod decode;
 mod disparity;
-mod exact;
 mod field_format;
 mod field_npz;
 mod flo;

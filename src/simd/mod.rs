@@ -9,16 +9,15 @@
 
 mod exponential;
 mod lanes;
-mod precision;
 mod scalar;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 pub(crate) use exponential::exp;
 pub(crate) use lanes::{Lanes, SimdReal};
-pub(crate) use precision::{same, same_mut};
 
 use crate::error::{Error, Result};
+use std::any::Any;
 use std::sync::OnceLock;
 
 /// The environment variable that sets the level.
@@ -163,6 +162,22 @@ fn run_avx2<T: SimdReal, K: Kernel<T>>(kernel: K) -> K::Output {
 #[target_feature(enable = "avx2,fma,avx512f,avx512dq,avx512vl")]
 fn run_avx512<T: SimdReal, K: Kernel<T>>(kernel: K) -> K::Output {
     kernel.run::<T::Avx512>()
+}
+
+/// `value` as a `B`, when that is what it is: chooses an instance that is compiled once for each precision.
+///
+/// A generic function is compiled again in every crate that calls it: each test, bench and user would compile
+/// all kernels. Public generic functions therefore call an instance for `f32` or `f64` that is compiled once,
+/// in this crate.
+#[inline]
+pub(crate) fn same<A: 'static, B: 'static>(value: &A) -> Option<&B> {
+    (value as &dyn Any).downcast_ref()
+}
+
+/// `value` as a `B` to be changed, when that is what it is.
+#[inline]
+pub(crate) fn same_mut<A: 'static, B: 'static>(value: &mut A) -> Option<&mut B> {
+    (value as &mut dyn Any).downcast_mut()
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
-//! Any texture carried by any motion.
+//! Any texture carried by any motion; band-limited noise by a steady affine one.
 
-use super::{Scene, motion::Motion, scene::render, texture::Texture};
+use super::motion::{AffineField, Motion};
+use super::texture::{Noise, Texture};
+use super::{Scene, scene::render};
+use crate::error::Result;
 use crate::types::{AffineFlow, Frame};
 
 /// `I(p, t) = texture(phi(p))`, where `phi` follows the particle path through `p` at time `t` back to time 0.
@@ -52,5 +55,33 @@ impl<X: Texture, M: Motion> Scene for Carried<X, M> {
             let (x, y) = back(origin.0 + column as f64, origin.1 + row as f64);
             self.texture.value(x, y)
         })
+    }
+}
+
+/// Gaussian-filtered noise moving by `u(p) = (u, v) + M (p - c)`, the same at every time: the scene on
+/// which affine estimators are measured.
+pub type AffineTexture = Carried<Noise, AffineField>;
+
+impl AffineTexture {
+    /// Noise of standard deviation 40 grey levels about 128, filtered by a Gaussian of 2 px, moving by
+    /// `motion = (u, v, u_x, v_x, u_y, v_y)` at the centre of the frame, `((width - 1) / 2, (height - 1) /
+    /// 2)`.
+    ///
+    /// # Errors
+    /// None with these settings; passes on what [`Noise::new`] reports.
+    pub fn moving(size: (usize, usize), motion: [f64; 6], seed: u64) -> Result<Self> {
+        Ok(Self::with_noise(size, motion, Noise::new(2.0, 40.0, 128.0, seed)?))
+    }
+
+    /// The same motion of a noise of one's own.
+    pub fn with_noise(size: (usize, usize), motion: [f64; 6], noise: Noise) -> Self {
+        let centre = ((size.0 as f64 - 1.0) / 2.0, (size.1 as f64 - 1.0) / 2.0);
+        Carried::new(size, noise, AffineField::new(motion, centre))
+    }
+
+    /// The settings that the estimators' accuracy is quoted for: `M = [[0.01, -0.02], [0.02, 0.01]]`, `(u, v)
+    /// = (0.3, -0.2)` at the centre, noise filtered by 2 px with a standard deviation of 40 grey levels.
+    pub fn reference(width: usize, height: usize, seed: u64) -> Result<Self> {
+        Self::moving((width, height), [0.3, -0.2, 0.01, 0.02, -0.02, 0.01], seed)
     }
 }

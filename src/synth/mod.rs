@@ -6,7 +6,6 @@
 //! [`CounterRng`](crate::math::random::CounterRng), so a scene is the same on any machine and number of
 //! threads.
 
-mod affine_texture;
 mod carried;
 mod disc;
 pub mod motion;
@@ -19,8 +18,7 @@ pub mod targets;
 pub mod texture;
 mod truth;
 
-pub use affine_texture::AffineTexture;
-pub use carried::Carried;
+pub use carried::{AffineTexture, Carried};
 pub use disc::{RotatingDisc, radians_per_frame};
 pub use particles::{ParticleImages, ParticleLook};
 pub use ramp::RotatingRamp;

@@ -6,21 +6,35 @@
 //!   other's predictions.
 //! * [`StereoTracker`]: all moving objects before a pair of cameras; takes pairs of views, no boxes.
 //!
-//! `tracker` has the trait; `grey_levels` brings frames to the scale of the thresholds; `persist` keeps
-//! trackers as bytes.
+//! `grey_levels` brings frames to the scale of the thresholds; `persist` keeps trackers as bytes.
 
 pub mod gradient;
 mod grey_levels;
 pub mod particle;
 mod persist;
 pub mod stereo;
-mod tracker;
 
 pub use gradient::GradientTracker;
 pub use grey_levels::GreyLevels;
 pub use particle::ParticleTracker;
 pub use stereo::StereoTracker;
-pub use tracker::Tracker;
+
+use crate::error::Result;
+use crate::types::{Frame, TrackState};
 
 /// Names of the methods; a new tracker is one folder and one name here.
 pub const METHODS: &[&str] = &["gradient", "stereo", "particle"];
+
+/// A tracker of one target. It is deterministic, keeps bounded memory and shares nothing with others: several
+/// targets are several trackers.
+pub trait Tracker: Send {
+    /// The target in the next frame. Frames that cannot be used (any sample that is not finite) count as
+    /// frames in which the target was not seen.
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::Error::Argument) named `frame` for another size than the first frame's.
+    fn update(&mut self, frame: &Frame<f64>) -> Result<TrackState>;
+
+    /// The target at the last frame.
+    fn state(&self) -> &TrackState;
+}

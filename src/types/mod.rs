@@ -4,7 +4,6 @@ mod camera;
 mod choice;
 mod field;
 mod frame;
-mod interval;
 mod motion;
 mod precision;
 mod region;
@@ -14,9 +13,8 @@ mod units;
 
 pub use camera::Intrinsics;
 pub(crate) use choice::{choice_by_name, choices};
-pub use field::{FieldLayout, FlowField};
+pub use field::{FieldLayout, FlowField, Interval};
 pub use frame::{AnyColourFrame, AnyFrame, ColourFrame, Frame, LARGEST_EXACT_INTEGER, Mask, Sample, expect_dtype};
-pub use interval::Interval;
 pub use motion::{AffineFlow, MOTION_NAMES};
 pub use precision::{AnyField, Precision};
 pub use region::{Rect, Region, SamplingGrid};

@@ -1,9 +1,10 @@
-//! Where frames come from and what is done to them first.
+//! Where frames come from, what is done to them first, and the size of their pixels.
 
-use super::{parse_not_negative, parse_positive, parse_rate};
+use super::{parse_not_negative, parse_pair, parse_positive, parse_rate};
 use crate::error::{Error, Result};
 use crate::io::{Colour, OpenOptions, PlaneSelection, Slices};
 use crate::pipeline::Numbering;
+use crate::types::Units;
 use clap::Args;
 
 /// Which planes of TIFF files with several axes are frames.
@@ -98,4 +99,23 @@ pub struct InputArguments {
     /// Smooth each frame by a Gaussian of SIGMA pixels [default: windowed 1.5, everything else 0]
     #[arg(long, value_name = "SIGMA", value_parser = parse_not_negative)]
     pub smooth: Option<f64>,
+}
+
+/// Physical size of a pixel. The unit of time follows from the frame rate of the input.
+#[derive(Debug, Clone, Args)]
+pub struct UnitArguments {
+    /// Physical size of a pixel; lengths then come in that unit [default: what a TIFF file of ImageJ or OME
+    /// says, else px]
+    #[arg(long, value_name = "DX[,DY]", value_parser = parse_pair)]
+    pub pixel_pitch: Option<(f64, f64)>,
+    /// Name of that unit, such as mm
+    #[arg(long, value_name = "NAME", requires = "pixel_pitch")]
+    pub length_unit: Option<String>,
+}
+
+impl UnitArguments {
+    /// The units of a field, with the seconds between frames if they are known.
+    pub fn units(&self, frame_period: Option<f64>) -> Units {
+        Units::new(self.pixel_pitch.unwrap_or((1.0, 1.0)), self.length_unit.as_deref(), frame_period)
+    }
 }

@@ -9,19 +9,17 @@ mod output;
 mod particle_track;
 mod stereo_track;
 mod track;
-mod units;
 mod views;
 
 pub use compute::{ComputeArguments, MessageArguments, ThreadArguments};
 pub use filter::{FilterArguments, describe_filter};
 pub use grid::GridArguments;
-pub use input::{InputArguments, PlaneArguments, SelectionArguments};
+pub use input::{InputArguments, PlaneArguments, SelectionArguments, UnitArguments};
 pub use method::MethodArguments;
 pub use output::OutputArguments;
 pub use particle_track::ParticleTrackerArguments;
 pub use stereo_track::StereoTrackerArguments;
 pub use track::{TargetArguments, TrackerArguments};
-pub use units::UnitArguments;
 pub use views::{LayoutArguments, SearchArguments};
 
 /// `KxL` (or `K` for a square): width and height of a neighbourhood or a frame.

@@ -1,6 +1,6 @@
 //! A graph over time: steps to the right, a lane for each component.
 
-use super::{Picture, Rgb, clusters::identity_colour, digits::draw_number, line::draw_stroke};
+use super::{Picture, Rgb, clusters::identity_colour, draw::draw_number, draw::draw_stroke};
 
 /// Distance of steps where there is room, and of lanes, px.
 const PITCH: [f64; 2] = [36.0, 28.0];

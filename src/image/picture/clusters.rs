@@ -1,6 +1,6 @@
 //! Numbered objects drawn over a view: their pixels in colours of their own, their numbers, their motions.
 
-use super::{Arrow, Picture, Quiver, Rgb, digits::draw_number};
+use super::{Arrow, Picture, Quiver, Rgb, draw::draw_number};
 
 /// Hues of successive numbers are this share of the wheel apart (the golden section).
 const APART: f64 = 0.618_033_988_749_895;

@@ -6,11 +6,10 @@
 mod chart;
 mod clusters;
 mod contact;
-mod digits;
 mod disparity;
 mod diverging;
+mod draw;
 mod grey;
-mod line;
 mod overlay;
 mod quiver;
 mod wheel;

@@ -1,6 +1,6 @@
 //! Tracks drawn over a frame: box, path, centre with its error ellipse, window.
 
-use super::{Picture, Rgb, clusters::identity_colour, digits::draw_number, line::draw_stroke};
+use super::{Picture, Rgb, clusters::identity_colour, draw::draw_number, draw::draw_stroke};
 use crate::types::{TrackState, TrackStatus};
 
 /// Squared radius of the ellipse that holds 95 % of a two-dimensional Gaussian: the 0.95 quantile of

@@ -1,6 +1,6 @@
 //! Flow as arrows over a picture.
 
-use super::{Picture, Rgb, check_plane, line::draw_stroke, percentile};
+use super::{Picture, Rgb, check_plane, draw::draw_stroke, percentile};
 use crate::error::{Error, Result};
 use crate::math::Real;
 

@@ -3,8 +3,7 @@
 use super::directory::{FileDecoder, number, numbers, tiff_error, unsupported};
 use super::stored::{LZMA, LZW, PALETTE, ZSTANDARD, restated};
 use crate::error::{Error, Result, check_memory};
-use crate::io::channels::{ChannelPolicy, Channels};
-use crate::io::exact::{exact_doubles, widened};
+use crate::io::channels::{ChannelPolicy, Channels, exact_doubles, widened};
 use crate::io::limits::check_size;
 use crate::types::Sample;
 use std::io::{Read, Seek};

@@ -2,8 +2,7 @@
 
 use super::{FrameSource, Kind, has_extension};
 use crate::error::{Error, Result};
-use crate::io::channels::{ChannelPolicy, Channels, Colour, ColourUse};
-use crate::io::exact::{exact_doubles, widened};
+use crate::io::channels::{ChannelPolicy, Channels, Colour, ColourUse, exact_doubles, widened};
 use crate::io::limits::check_size;
 use crate::io::npy::{Element, ElementType, NpyHeader};
 use crate::types::Sample;

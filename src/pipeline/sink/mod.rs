@@ -3,17 +3,15 @@
 mod egomotion;
 mod fields;
 mod measurements;
-mod memory;
 mod pictures;
 mod table;
 
 pub use egomotion::{Egomotion, EgomotionPlan};
-pub use fields::Fields;
+pub use fields::{Collect, Fields};
 pub use measurements::{MeasuredRegion, Measurements};
-pub use memory::Collect;
 pub use pictures::{PictureRanges, Pictures};
 pub(in crate::pipeline) use table::end_table;
-pub use table::{Rows, Table, TableTarget};
+pub use table::{Rows, Table, TableTarget, TextFormat};
 
 use super::{output::OutputPlan, output::Place, output::check_writable};
 use crate::error::{Error, Result};

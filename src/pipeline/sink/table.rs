@@ -1,4 +1,4 @@
-//! Rows of CSV tables that grow while a run lasts.
+//! Rows of CSV tables that grow while a run lasts, and the names of formats of text.
 //!
 //! A file gets its name only when the run is complete. The rows of a run that was stopped are kept beside it,
 //! as `name.partial.csv`: nothing is lost, and nothing half is taken for whole. Standard output gets the rows
@@ -8,6 +8,7 @@ use super::{Ending, Sink, Step};
 use crate::error::Result;
 use crate::io::{FieldTable, TableWriter};
 use crate::math::Real;
+use crate::types::choice_by_name;
 use std::path::{Path, PathBuf};
 
 /// Where a table of rows goes.
@@ -32,6 +33,28 @@ impl TableTarget {
     fn partial(&self) -> PathBuf {
         let extension = self.path().extension().map_or_else(|| "csv".into(), |e| e.to_string_lossy());
         self.path().with_extension(format!("partial.{extension}"))
+    }
+}
+
+/// The kinds of text that one kind of result is written as; the first is the default.
+pub trait TextFormat: Copy + PartialEq + 'static {
+    /// Every format.
+    const ALL: &'static [Self];
+
+    /// The format's word.
+    fn name(self) -> &'static str;
+
+    /// The extension of its files.
+    fn extension(self) -> &'static str {
+        self.name()
+    }
+
+    /// The format called `name`.
+    ///
+    /// # Errors
+    /// [`Error::Argument`](crate::error::Error::Argument) named `format`.
+    fn parse(name: &str) -> Result<Self> {
+        choice_by_name("format", name, Self::ALL, Self::name)
     }
 }
 

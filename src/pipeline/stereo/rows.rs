@@ -3,8 +3,7 @@
 use super::{StereoSink, StereoStep};
 use crate::error::Result;
 use crate::io::cell;
-use crate::pipeline::sink::{Table, TableTarget, ends_as};
-use crate::pipeline::text_format::TextFormat;
+use crate::pipeline::sink::{Table, TableTarget, TextFormat, ends_as};
 use crate::track::stereo::{Node, TrackGraph};
 use std::path::PathBuf;
 

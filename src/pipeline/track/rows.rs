@@ -3,8 +3,7 @@
 use super::TrackStep;
 use crate::error::Result;
 use crate::io::{MotTable, TrackTable};
-use crate::pipeline::sink::{Ending, Sink, TableTarget, end_table, ends_as};
-use crate::pipeline::text_format::TextFormat;
+use crate::pipeline::sink::{Ending, Sink, TableTarget, TextFormat, end_table, ends_as};
 use crate::types::TrackState;
 use std::path::{Path, PathBuf};
 

@@ -1,8 +1,7 @@
-//! Velocity fields whose particle paths are known in closed form.
+//! Velocity fields with the paths of their particles, known in closed form or integrated.
 
 mod affine;
 mod approach;
-mod integrate;
 mod shear;
 mod turbulence;
 mod vortex;
@@ -15,8 +14,8 @@ pub use turbulence::Turbulence;
 pub use vortex::LambOseen;
 pub use waves::Waves;
 
+use crate::parallel::checkpoint;
 use crate::types::AffineFlow;
-use integrate::{integrate, max_duration};
 
 /// A map of the plane, prepared once for a time.
 pub type PointMap<'a> = Box<dyn Fn(f64, f64) -> (f64, f64) + Send + Sync + 'a>;
@@ -57,4 +56,38 @@ impl<M: Motion + ?Sized> Motion for Box<M> {
     fn max_duration(&self) -> f64 {
         (**self).max_duration()
     }
+}
+
+/// Maximum number of steps along one path, so that no call runs for hours.
+const MAX_STEPS: f64 = 1e5;
+
+/// Longest duration of [`integrate`], frames.
+fn max_duration(steps_per_frame: f64) -> f64 {
+    (MAX_STEPS / steps_per_frame).floor()
+}
+
+/// The map along the paths of a steady field `velocity` without a closed form, for `duration` frames:
+/// Runge-Kutta. NaN beyond [`max_duration`].
+fn integrate<'a>(
+    velocity: impl Fn(f64, f64) -> (f64, f64) + Send + Sync + 'a,
+    duration: f64,
+    steps_per_frame: f64,
+) -> PointMap<'a> {
+    if duration.is_nan() || duration.abs() > max_duration(steps_per_frame) {
+        return Box::new(|_, _| (f64::NAN, f64::NAN));
+    }
+    let steps = (duration.abs() * steps_per_frame).ceil();
+    let h = if steps > 0.0 { duration / steps } else { 0.0 };
+    Box::new(move |mut x, mut y| {
+        for _ in 0..steps as usize {
+            checkpoint();
+            let (a_u, a_v) = velocity(x, y);
+            let (b_u, b_v) = velocity(x + 0.5 * h * a_u, y + 0.5 * h * a_v);
+            let (c_u, c_v) = velocity(x + 0.5 * h * b_u, y + 0.5 * h * b_v);
+            let (d_u, d_v) = velocity(x + h * c_u, y + h * c_v);
+            x += h / 6.0 * (a_u + 2.0 * b_u + 2.0 * c_u + d_u);
+            y += h / 6.0 * (a_v + 2.0 * b_v + 2.0 * c_v + d_v);
+        }
+        (x, y)
+    })
 }

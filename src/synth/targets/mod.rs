@@ -17,7 +17,6 @@
 //! ```
 
 mod camera;
-mod colour;
 mod list;
 mod options;
 mod path;

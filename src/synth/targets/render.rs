@@ -1,6 +1,6 @@
 //! From a scene to its frames.
 
-use super::{colour::blend, list::Pillar, scene::TargetScene, sprite::Drawing};
+use super::{list::Pillar, scene::TargetScene, sprite::Drawing, sprite::blend};
 use crate::parallel::for_each_band;
 use crate::types::ColourFrame;
 use std::ops::Range;

@@ -1,6 +1,6 @@
 //! The world that the camera looks at.
 
-use super::colour::{CAR_BODY, Hsv, SHIRT, SKIN, TROUSERS, blend};
+use super::sprite::{CAR_BODY, Hsv, SHIRT, SKIN, TROUSERS, blend};
 use super::value_noise::value_noise;
 use crate::math::random::CounterRng;
 use crate::types::ColourFrame;

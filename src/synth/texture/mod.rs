@@ -2,12 +2,10 @@
 
 mod noise;
 mod speckle;
-mod strewn;
 
 pub use noise::Noise;
 pub use speckle::Speckle;
-pub(crate) use speckle::smooth_step;
-pub(crate) use strewn::{cell_index, poisson_of_mean_one};
+pub(crate) use speckle::{cell_index, poisson_of_mean_one, smooth_step};
 
 /// The brightness that matter carries with it.
 pub trait Texture: Send + Sync {

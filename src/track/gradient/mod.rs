@@ -7,15 +7,13 @@
 //!
 //! A target starts with a box, or with what moves first (`start`, `detect`); then each frame passes the
 //! stages of `layered`, which filters the position by `gauss_markov`. `options` are what it is given; `shift`
-//! (pictures between their pixels) and `noise` (robust statistics of brightness) serve all; `persist` keeps
-//! the tracker.
+//! (pictures between their pixels) and `noise` (robust statistics of brightness) serve all.
 
 mod detect;
 mod gauss_markov;
 mod layered;
 mod noise;
 mod options;
-mod persist;
 #[cfg(feature = "reference")]
 pub mod reference;
 mod shift;
@@ -25,7 +23,7 @@ pub use detect::{MovingTarget, detect_moving_target};
 pub use gauss_markov::{Dynamics, GaussMarkovFilter, Measurement, Velocity};
 pub use options::{CameraMotion, GradientOptions, Shape, Start};
 
-use super::Tracker;
+use super::{Tracker, persist::Kind};
 use crate::error::{Error, Result};
 use crate::types::{Frame, TargetBox, TrackState};
 use layered::State;
@@ -72,6 +70,9 @@ enum Engine {
     #[cfg(feature = "reference")]
     Local(Box<LocalLoop>),
 }
+
+/// Mark and layout of the tracker as bytes; reductions of the last frame are not among them but made again.
+const BYTES: Kind = Kind { mark: *b"JFGT", layout: 1, what: "gradient tracker" };
 
 /// Follows one target.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
@@ -125,6 +126,21 @@ impl GradientTracker {
     #[cfg(feature = "reference")]
     pub fn search_window(&self) -> Option<SearchWindow> {
         if let Engine::Local(local) = &self.engine { Some(local.window()) } else { None }
+    }
+}
+
+impl GradientTracker {
+    /// Everything, as bytes: what they give back goes on as this one would, bit for bit.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        BYTES.sealed(self)
+    }
+
+    /// A tracker from the bytes that [`GradientTracker::to_bytes`] gave.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `state` for bytes of another kind or layout, and for damaged ones.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        BYTES.opened(bytes)
     }
 }
 

@@ -1,11 +1,10 @@
 //! Advances one target by a frame: particles, weights, estimate.
 
-use super::appearance::CentredBox;
 use super::cloud::{Cloud, Purpose, Start, stream};
 use super::colour_table::ColourTable;
 use super::corners::Track;
 use super::evidence::{Evidence, track_evidence};
-use super::geometry::{distance, holds};
+use super::geometry::{CentredBox, distance, holds};
 use super::likelihood::{DistanceFactor, Factors, TrackFactor, VelocityFactor};
 use super::noise::{Noise, colour_gain};
 use super::prediction::FrameContext;

@@ -1,6 +1,7 @@
 //! What a target looks like: banded colour histograms of its first box, compared with those of other boxes.
 
-use super::{bins::BINS, bins::NO_BIN};
+use super::bins::{BINS, NO_BIN};
+use super::geometry::{CentredBox, visible_share};
 use crate::types::Frame;
 
 /// Bands of a box, from top to bottom.
@@ -9,9 +10,6 @@ const BANDS: usize = 8;
 const WINDOW: usize = 3;
 /// Bands of boxes too low for eight.
 const MIN_BANDS: usize = 3;
-
-/// A box by its centre: x, y, width, height, px.
-pub(super) type CentredBox = [f64; 4];
 
 /// Pixel columns `[left, right)` and edges of the bands of a box, not yet cut to the picture.
 pub(super) struct BandGrid {
@@ -121,14 +119,6 @@ impl Appearance {
         }
         sum / self.windows() as f64 * visibility_factor(bounds, bins.size())
     }
-}
-
-pub(super) fn visible_share([x, y, w, h]: CentredBox, (width, height): (usize, usize)) -> f64 {
-    let side = |centre: f64, length: f64, size: usize| {
-        let (low, high) = (centre - length / 2.0, centre + length / 2.0);
-        (high.min(size as f64 - 0.5) - low.max(-0.5)).max(0.0) / length
-    };
-    side(x, w, width) * side(y, h, height)
 }
 
 /// Boxes of which less than half is in the picture are less similar.

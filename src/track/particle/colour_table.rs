@@ -1,7 +1,8 @@
 //! Colour similarity of many boxes at once: one summed-area table for every bin that the reference uses.
 
-use super::appearance::{Appearance, BandGrid, CentredBox, visibility_factor};
+use super::appearance::{Appearance, BandGrid, visibility_factor};
 use super::bins::NO_BIN;
+use super::geometry::CentredBox;
 use crate::simd::{Kernel, Lanes, Level, dispatch};
 use crate::types::Frame;
 

@@ -1,6 +1,7 @@
 //! Which target a corner track belongs to.
 
-use super::{appearance::CentredBox, corners::Track, geometry::distance, geometry::holds};
+use super::corners::Track;
+use super::geometry::{CentredBox, distance, holds};
 use crate::math::median;
 
 /// A label is kept, and gained, inside the target's box enlarged by this.

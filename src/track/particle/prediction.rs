@@ -1,10 +1,9 @@
 //! Predictions before a frame is weighed: positions, near targets, hidden targets.
 
-use super::appearance::CentredBox;
 use super::camera::CameraMotion;
 use super::corners::Track;
 use super::foreground::ForegroundMap;
-use super::geometry::{covered_share, distance, holds};
+use super::geometry::{CentredBox, boxes_touch, covered_share, distance, holds};
 use super::labels::review;
 use super::noise::near_radius;
 use super::options::{Likelihoods, ParticleMode, ParticleOptions};
@@ -12,8 +11,6 @@ use super::presence::COVER;
 use super::target::{Target, labelled};
 use crate::types::Frame;
 
-/// Targets are near each other, too, if their boxes shrunk to this overlap.
-const NEAR_BOXES: f64 = 0.9;
 /// Factor of the box in which tracks can end a target's being hidden.
 const RETURN_BOX: f64 = 1.2;
 /// Probability of not being background of such a track.
@@ -113,11 +110,6 @@ fn predicted(target: &Target, camera: &CameraMotion) -> Prediction {
         entered_low: false,
         labelled: 0,
     }
-}
-
-/// Whether two predicted boxes overlap once they are shrunk.
-fn boxes_touch(a: CentredBox, b: CentredBox) -> bool {
-    (0..2).all(|i| (a[i] - b[i]).abs() < 0.5 * NEAR_BOXES * (a[2 + i] + b[2 + i]))
 }
 
 fn find_near(predictions: &mut [Prediction], targets: &[Target], options: &ParticleOptions, scale: f64) {

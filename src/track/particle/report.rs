@@ -1,8 +1,8 @@
 //! Assembles the result of a frame from the tracker's state.
 
-use super::appearance::CentredBox;
 use super::camera::CameraMotion;
 use super::corners::Track;
+use super::geometry::CentredBox;
 use super::prediction::Prediction;
 use super::step::{CornerTrack, ParticleStep, ParticleTarget};
 use super::target::Target;

@@ -1,8 +1,9 @@
 //! One target: appearance, particles and estimate.
 
-use super::appearance::{Appearance, CentredBox};
+use super::appearance::Appearance;
 use super::camera::CameraMotion;
 use super::cloud::{Cloud, Particle, Purpose, Start, stream};
+use super::geometry::CentredBox;
 use super::labels::Labelled;
 use super::noise::Noise;
 use super::options::ParticleOptions;

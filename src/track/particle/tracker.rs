@@ -1,10 +1,9 @@
 //! The tracker: targets, corners and the last frame.
 
-use super::appearance::{CentredBox, visible_share};
 use super::camera::{CameraMotion, fit_background};
 use super::corners::{Corners, Track};
 use super::foreground::{ForegroundMap, background_flow};
-use super::geometry::centred;
+use super::geometry::{CentredBox, centred, visible_share};
 use super::labels::assign;
 use super::likelihood::is_inside;
 use super::options::{ForegroundModel, ParticleMode, ParticleOptions};

@@ -11,7 +11,6 @@
 //! * [`clusters`]: voxels and pixels of each component; [`overlap`] with the last step; [`succession`];
 //! * [`association`]: which track each component is, over time gaps of the [`clock`];
 //! * [`own_pixels`], [`grouping`], [`graph`], [`step`]: middles, objects, arcs and the result.
-//!   [`persist`] keeps the tracker.
 //!
 //! [`tracker`] calls them with its [`options`]. All results refer to the left view: positions `(x, y)` px,
 //! disparity `d = x_left - x_right` (near is large), motion `(u, v)` px/step and `w` disparity/step.
@@ -33,7 +32,6 @@ mod measured_motion;
 mod options;
 mod overlap;
 mod own_pixels;
-mod persist;
 mod step;
 mod succession;
 mod tracker;

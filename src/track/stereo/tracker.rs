@@ -20,8 +20,12 @@ use super::voxels::{EdgePoints, Lattice, Voxels};
 use crate::error::{Error, Result};
 use crate::mixture::Posterior;
 use crate::stereo::{EdgeDisparity, SequenceRows};
+use crate::track::persist::Kind;
 use crate::types::Frame;
 use std::collections::BTreeMap;
+
+/// Mark and layout of the tracker as bytes.
+const BYTES: Kind = Kind { mark: *b"JFST", layout: 2, what: "stereo tracker" };
 
 /// Tracks all moving objects before a pair of cameras, which may move.
 ///
@@ -44,6 +48,7 @@ pub struct StereoTracker {
     graph: TrackGraph,
     tracks: BTreeMap<u64, Track>,
 }
+
 impl StereoTracker {
     /// A tracker before its first step.
     ///
@@ -177,5 +182,20 @@ impl StereoTracker {
         self.time += 1;
         self.waited = None;
         Ok(step)
+    }
+}
+
+impl StereoTracker {
+    /// Everything, as bytes: what they give back goes on as this one would, bit for bit.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        BYTES.sealed(self)
+    }
+
+    /// A tracker from the bytes that [`StereoTracker::to_bytes`] gave.
+    ///
+    /// # Errors
+    /// [`Error::Argument`] named `state` for bytes of another kind or layout, and for damaged ones.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        BYTES.opened(bytes)
     }
 }
