@@ -24,8 +24,8 @@ const LITTLE: f64 = 0.25;
 /// Parts of the picture from which two motions are looked for.
 const PARTS: usize = 4;
 
-/// What two motions must explain more than one if that of more points has another direction: twice the unknowns
-/// of one more, and which points have it.
+/// What two motions must explain more than one if that of more points has another direction: twice the
+/// unknowns of one more, and which points have it.
 const ANOTHER: f64 = 20.0;
 
 /// What they must explain more wherever their directions are, if the noise was given: so many unknowns, the
