@@ -28,10 +28,11 @@ const PARTS: usize = 4;
 /// unknowns of one more, and which points have it.
 const ANOTHER: f64 = 20.0;
 
-/// What they must explain more wherever their directions are, if the noise was given: so many unknowns, the
-/// second motion's own and the place and size of its region, each times `ln n` (G. Schwarz 1978). Where noise
-/// hides the difference both fits stay near the third motion that they share, although neither the scene nor
-/// the object has it. Unknown noise may be errors that go together, which look like this.
+/// What they must explain more wherever their directions are, if parts that deviate lie apart and the noise
+/// was given: so many unknowns, the second motion's own and the place and size of its region, each times
+/// `ln n` (G. Schwarz 1978). Where noise hides the difference both fits stay near the third motion that they
+/// share, although neither the scene nor the object has it. Outliers that fit by chance deviate in one part,
+/// and unknown noise may be errors that go together, which look like this.
 const ADDED: f64 = 8.0;
 
 /// Returns what may be the scene's motion instead of `found` if its inliers `points` have structured
@@ -61,12 +62,18 @@ pub(crate) fn competing_motion(
     let [turned, turned_fewer] = [more, fewer].map(|motion| motion.angle_to(found));
     let is_another = turned.to_degrees() > APART;
     let needed = if is_another { ANOTHER } else { ADDED * n.ln() };
-    if together - two.cost <= needed || (unknown && !is_another) {
+    if together - two.cost <= needed || !(is_another || !unknown && lie_apart(&parts)) {
         return None;
     }
     let motion = if is_another || turned > turned_fewer { more } else { fewer };
     let excess = truncated(observations, &motion, INLIER) - truncated(observations, found, INLIER);
     Some(Alternative { motion, excess: excess.max(0.0) })
+}
+
+/// Whether two of the parts have no point in common; of others one holds the other.
+fn lie_apart(parts: &[Vec<u32>]) -> bool {
+    let holds = |one: &[u32], other: &[u32]| one.contains(&other[0]);
+    parts.iter().any(|one| parts.iter().any(|other| !holds(one, other) && !holds(other, one)))
 }
 
 /// The smallest parts, as a share of the points, and the fewest points of one.
