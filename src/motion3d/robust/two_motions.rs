@@ -264,6 +264,13 @@ mod tests {
     }
 
     #[test]
+    fn parts_lie_apart_unless_one_holds_the_other() {
+        let [all, first, second] = [0..8, 0..4, 4..8].map(|places| places.collect::<Vec<u32>>());
+        assert!(!lie_apart(&[all.clone()]) && !lie_apart(&[first.clone(), all.clone()]));
+        assert!(lie_apart(&[first, all, second]));
+    }
+
+    #[test]
     fn a_part_with_another_rotation_pulls_apart_and_noise_does_not() {
         let all: Vec<u32> = (0..400).collect();
         let (mut chance, mut found) = (0, 0);
