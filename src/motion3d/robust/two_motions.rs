@@ -31,9 +31,12 @@ const ANOTHER: f64 = 20.0;
 /// What they must explain more wherever their directions are, if parts that deviate lie apart and the noise
 /// was given: so many unknowns, the second motion's own and the place and size of its region, each times
 /// `ln n` (G. Schwarz 1978). Where noise hides the difference both fits stay near the third motion that they
-/// share, although neither the scene nor the object has it. Outliers that fit by chance deviate in one part,
-/// and unknown noise may be errors that go together, which look like this.
+/// share, although neither the scene nor the object has it. Outliers that fit by chance deviate in one part.
 const ADDED: f64 = 8.0;
+
+/// What they must explain more of each point in unknown noise, if that of fewer points has another direction:
+/// unknown noise may be errors that go together, which look like the motion of a few.
+const EACH: f64 = 0.12;
 
 /// Returns what may be the scene's motion instead of `found` if its inliers `points` have structured
 /// residuals: if two motions explain them better, that of more points if it is another one, else the farther.
@@ -61,8 +64,14 @@ pub(crate) fn competing_motion(
     let [more, fewer] = two.motions;
     let [turned, turned_fewer] = [more, fewer].map(|motion| motion.angle_to(found));
     let is_another = turned.to_degrees() > APART;
-    let needed = if is_another { ANOTHER } else { ADDED * n.ln() };
-    if together - two.cost <= needed || !(is_another || !unknown && lie_apart(&parts)) {
+    let (differs, needed) = if is_another {
+        (true, ANOTHER)
+    } else if unknown {
+        (turned_fewer.to_degrees() > APART, ANOTHER.max(EACH * n))
+    } else {
+        (lie_apart(&parts), ADDED * n.ln())
+    };
+    if !differs || together - two.cost <= needed {
         return None;
     }
     let motion = if is_another || turned > turned_fewer { more } else { fewer };
