@@ -86,6 +86,7 @@ GROUPS: dict[str, list[Callable[[int], coverage.Estimated]]] = {
     + [coverage.mover],
     "outliers": [lambda seed, share=share: coverage.outliers(seed, 0.2, share) for share in (0.4, 0.6)]
     + [coverage.few_points, lambda seed: coverage.far_background(seed, 0.2)],
+    "many outliers": [lambda seed: coverage.outliers(seed, 0.3, 0.6)],
     "planes": [lambda seed, ratio=ratio: layouts.plane(seed, ratio) for ratio in (1.0, 30.0)],
     "views": [lambda seed, depth=depth: layouts.views(seed, depth, 0.05) for depth in ("waves", "plane")],
     "exact": [exact],
