@@ -274,9 +274,11 @@ mod tests {
 
     #[test]
     fn parts_lie_apart_unless_one_holds_the_other() {
-        let [all, first, second] = [0..8, 0..4, 4..8].map(|places| places.collect::<Vec<u32>>());
-        assert!(!lie_apart(&[all.clone()]) && !lie_apart(&[first.clone(), all.clone()]));
-        assert!(lie_apart(&[first, all, second]));
+        let [all, first, second] = [0..8, 0..4, 4..8].map(Vec::<u32>::from_iter);
+        let mut parts = vec![first, all];
+        assert!(!lie_apart(&parts[1..]) && !lie_apart(&parts));
+        parts.push(second);
+        assert!(lie_apart(&parts));
     }
 
     #[test]
