@@ -31,7 +31,7 @@ QUICK_SHARE = 0.1
 """Share of the trials that `--quick` leaves."""
 SUMMARY_LINES = 300
 """Maximum length of the dated text file."""
-SUMMARY_ROWS, SUMMARY_COLUMNS = 9, 9
+SUMMARY_ROWS, SUMMARY_COLUMNS = 8, 9
 """Longer or wider tables are in the JSON file only."""
 
 
