@@ -84,7 +84,6 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("particle.shared_tracks", "tracks in another box are shared by their motion"),
     ("particle.full_tracks", "many own tracks weigh no more than twenty"),
     ("particle.jumping_tracks", "a track that jumps loses its label"),
-    ("particle.other_tracks", "a track that moves with another target loses its label"),
     ("particle.doubtful_tracks", "a deviating, doubtful track loses its label"),
     ("particle.unlike_tracks", "doubtful tracks lose their label while colours are unlike"),
     ("particle.mass_loss", "labels stay where most would be lost at once"),

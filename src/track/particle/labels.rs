@@ -39,11 +39,8 @@ pub(super) fn review(tracks: &mut [Track], targets: &[Labelled], scale: f64) {
         let mine: Vec<usize> = (0..tracks.len()).filter(|&j| tracks[j].owner == Some(own.id)).collect();
         let inside_other =
             |track: &Track| targets.iter().any(|l| l.id != own.id && holds(l.bounds, track.position, 1.0, 0.0));
-        let leaves = |track: &Track| {
-            crate::ablation::keeps("particle.jumping_tracks") && has_jumped(track, scale)
-                || crate::ablation::keeps("particle.other_tracks") && follows_other(track, own, targets, scale)
-        };
-        let leaving: Vec<usize> = mine.iter().copied().filter(|&j| leaves(&tracks[j])).collect();
+        let jumps = |track: &Track| crate::ablation::keeps("particle.jumping_tracks") && has_jumped(track, scale);
+        let leaving: Vec<usize> = mine.iter().copied().filter(|&j| jumps(&tracks[j])).collect();
         if !crate::ablation::keeps("particle.mass_loss") || leaving.len() as f64 <= MAX_LOSS * mine.len() as f64 {
             for j in leaving {
                 tracks[j].owner = None;
@@ -70,18 +67,6 @@ fn has_jumped(track: &Track, scale: f64) -> bool {
         (Some(now), Some(last)) => distance(now, last) > DIFFERENT * scale,
         _ => false,
     }
-}
-
-/// Whether a track lies in another target's box and moves as that one does.
-fn follows_other(track: &Track, own: &Labelled, targets: &[Labelled], scale: f64) -> bool {
-    let Some(residual) = track.residual else { return false };
-    distance(residual, own.velocity) > DIFFERENT * scale
-        && targets.iter().any(|other| {
-            other.id != own.id
-                && holds(other.bounds, track.position, 1.0, 0.0)
-                && distance(residual, other.velocity) < ALIKE * scale
-                && distance(other.velocity, own.velocity) > DIFFERENT * scale
-        })
 }
 
 /// Middle motion of some tracks relative to the background, px/frame.
