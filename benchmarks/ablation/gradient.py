@@ -1,6 +1,7 @@
 """The gradient tracker on scenes with exact truth and, with JACOFLOW_DATA, on recordings: share of frames
 found, outcomes of tests, time; of discs whose boxes hold background the greatest errors of the position, px,
-and over their standard deviations; of start boxes the share of positions within two standard deviations."""
+and over their standard deviations; of start boxes the share of positions within two standard deviations; of
+each recording of people the mean overlap from boxes that are larger, smaller or beside the first one."""
 
 from __future__ import annotations
 
@@ -21,10 +22,12 @@ from benchmarks.scenes.tracking import TIMES, Plane, Scene, Truth, disc, figure,
 from benchmarks.scenes.tracking_recordings import Recording
 from benchmarks.scores.tracking import scores
 
+PEOPLE = ("Crossing", *(f"TUD-Campus {target}" for target in (2, 3, 4, 5, 7)))
+"""Recordings whose start boxes are changed."""
 LARGER_IS_BETTER = (
     "hard", "simulations", "twins", "two planes", "start boxes", "small boxes", "bars", "fences", "half hidden",
     "jumps", "light", "other sizes, overlap", "first frames, held", "fast starts", "recordings",
-    "recordings, parts", "tests",
+    "recordings, parts", "tests", *(f"{name}, boxes" for name in PEOPLE),
 )  # fmt: skip
 TESTS = (
     "test_track.py", "test_track_begin.py", "test_track_covered.py", "test_track_edges.py", "test_track_limits.py",
@@ -46,6 +49,11 @@ FIRST = 13
 """Frames in which a first box may be undecided."""
 PART = 30
 """Frames of a part of a recording."""
+OTHER_BOXES = (
+    (1.0, 1.0, 0.0, 0.0), (1.2, 1.2, 0.0, 0.0), (1.4, 1.0, 0.0, 0.0), (0.85, 0.85, 0.0, 0.0),
+    (1.0, 1.0, 0.1, 0.0), (1.0, 1.0, -0.1, 0.0), (1.0, 1.0, 0.0, 0.1), (1.0, 1.0, 0.0, -0.1),
+)  # fmt: skip
+"""Sides of other start boxes over those of the first, and how far they are beside that, in sides."""
 DISC_KINDS, DISC_RADIUS = ("smooth:4,110,25", "fractal:1,90,30"), 14.0
 """Backgrounds and radius, px, of discs that are alone in their box."""
 
@@ -164,6 +172,16 @@ def overlap_of(tracker: Tracker, recording: Recording) -> float:
     return scores(tracker.run(recording.frames, recording.start_box), recording.truth)["mean_overlap"]
 
 
+def overlaps_from_other_boxes(tracker: Tracker, recording: Recording) -> list[float]:
+    """Mean overlap on a recording from each of the other start boxes."""
+    x, y, w, h = recording.start_box
+    boxes = [
+        (x + w * (0.5 + right - wide / 2), y + h * (0.5 + down - high / 2), w * wide, h * high)
+        for wide, high, right, down in OTHER_BOXES
+    ]
+    return [scores(tracker.run(recording.frames, box), recording.truth)["mean_overlap"] for box in boxes]
+
+
 LIT = 8
 """Scenes whose light changes."""
 LIGHT: dict[str, tuple[float, float]] = {"darker": (0.5, 0.0), "brighter": (1.4, 0.0), "a higher level": (1.0, 60.0)}
@@ -215,6 +233,7 @@ def rows() -> dict[str, list[float]]:
         data = Path(os.environ["JACOFLOW_DATA"])
         still = [each for each in tracking_recordings.read_all(data) if not isinstance(each, str)]
         found["recordings"] = [overlap_of(tracker, each) for each in still]
+        found |= {f"{each.name}, boxes": overlaps_from_other_boxes(tracker, each) for each in still}
         found["recordings, parts"] = [
             overlap_of(tracker, part)
             for each in [*still, *tracking_recordings.moving(data)]
