@@ -1,6 +1,6 @@
 """The stereo tracker on random scenes of people who cross: whether a hidden object is recognised.
 
-    python -m benchmarks.tables.stereo_tracking_chance [--trials 20]
+    python -m benchmarks.tables.stereo_tracking_chance [--trials 60]
 
 - `crossing`: the layout of the scene `crossing` with random places, speeds, depths, sizes and textures.
 - `passing`: a person is hidden for some steps by a pillar, by another person or by two; noise of 1 to 4 grey
@@ -23,7 +23,7 @@ from benchmarks.tables.stereo_tracking import follow
 from jacoflow.track import StereoTracker
 
 Row = dict[str, object]
-SEQUENCES = 20
+SEQUENCES = 60
 """Of each kind."""
 HISTORY = 3
 """Steps before it is hidden at which an object must have been seen."""
