@@ -233,7 +233,8 @@ def rows() -> dict[str, list[float]]:
         data = Path(os.environ["JACOFLOW_DATA"])
         still = [each for each in tracking_recordings.read_all(data) if not isinstance(each, str)]
         found["recordings"] = [overlap_of(tracker, each) for each in still]
-        found |= {f"{each.name}, boxes": overlaps_from_other_boxes(tracker, each) for each in still}
+        people = [each for each in still if each.name in PEOPLE]
+        found |= {f"{each.name}, boxes": overlaps_from_other_boxes(tracker, each) for each in people}
         found["recordings, parts"] = [
             overlap_of(tracker, part)
             for each in [*still, *tracking_recordings.moving(data)]

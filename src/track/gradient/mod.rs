@@ -127,9 +127,7 @@ impl GradientTracker {
     pub fn search_window(&self) -> Option<SearchWindow> {
         if let Engine::Local(local) = &self.engine { Some(local.window()) } else { None }
     }
-}
 
-impl GradientTracker {
     /// Everything, as bytes: what they give back goes on as this one would, bit for bit.
     pub fn to_bytes(&self) -> Vec<u8> {
         BYTES.sealed(self)

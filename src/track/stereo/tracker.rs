@@ -183,9 +183,7 @@ impl StereoTracker {
         self.waited = None;
         Ok(step)
     }
-}
 
-impl StereoTracker {
     /// Everything, as bytes: what they give back goes on as this one would, bit for bit.
     pub fn to_bytes(&self) -> Vec<u8> {
         BYTES.sealed(self)
