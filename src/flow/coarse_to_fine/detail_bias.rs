@@ -44,7 +44,7 @@ const MIN_SIDE: f64 = 4.0;
 /// Mean square of the smoothed frames' remainder, over that of white noise of their residuals (they keep a
 /// quarter of its energy) and over the scatter in the narrow window, that is taken for chance.
 const NOISE_IN_STEP: f64 = 3.0;
-const SCATTER_IN_STEP: f64 = 0.5;
+const SCATTER_IN_STEP: f64 = 0.4;
 /// Mean square of a remainder, over that of white noise, that is taken for chance: around a node, and after
 /// more binomial means, 16 px around it.
 const NOISE_IN_REMAINDER: [f64; 2] = [1.5, 1.2];
