@@ -3,12 +3,14 @@ at all."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
 
 import jacoflow
 from benchmarks import report
@@ -20,6 +22,7 @@ from benchmarks.scores.flow import (
     differences,
     end_point_error,
     inside,
+    interior,
     intervals,
     jacobian_error,
     root_mean_square,
@@ -139,6 +142,51 @@ def uncertainty(data: Path, presets: tuple[str, ...] = ("balanced", "fast", "acc
     return rows + [{"sample": line, "preset": "skipped"} for line in missing]
 
 
+WINDOW = 48
+"""Side of the windows in which `left_by_truth` measures, px."""
+
+
+def left_by_truth(sample: Sample) -> Array:
+    """How far the next frame lies off after it was brought back along the truth, px, (n, 2): one step of
+    Lucas and Kanade in each window that lies in the interior. A truth without errors leaves what noise, light
+    and occlusion do in such windows, whatever the estimators."""
+    first, second = (np.asarray(frame, dtype=float) for frame in sample.pair())
+    if first.ndim == 3:
+        first, second = first.mean(axis=-1), second.mean(axis=-1)
+    rows, columns = np.indices(first.shape)
+    u, v = np.moveaxis(np.nan_to_num(sample.truth), -1, 0)
+    back = map_coordinates(second, [rows + v, columns + u], order=3, mode="nearest")
+    gradients = np.stack(np.gradient(0.5 * (first + back))[::-1], axis=-1)
+    weight, where = np.outer(*[np.hanning(WINDOW)] * 2), interior(sample.truth)
+    left = []
+    for y, x in itertools.product(*(range(0, n - WINDOW + 1, WINDOW // 2) for n in first.shape)):
+        window = np.s_[y : y + WINDOW, x : x + WINDOW]
+        if where[window].mean() > 0.97:
+            along = gradients[window].reshape(-1, 2)
+            weighted = along * weight.reshape(-1, 1)
+            change = (back - first)[window]
+            change = change - (weight * change).sum() / weight.sum()
+            # Without texture nothing is off.
+            left.append(np.linalg.lstsq(weighted.T @ along, -weighted.T @ change.ravel())[0])
+    return np.array(left).reshape(-1, 2)
+
+
+def truth(data: Path) -> list[Row]:
+    """Mean and root mean square of what the truth leaves of each recording, px: `left_by_truth`."""
+    if samples.cv2 is None:
+        return []
+    found, missing = samples.read_all(samples.FLOWS + samples.LAYERED, data)
+    rows: list[Row] = []
+    for sample in found:
+        left = left_by_truth(sample)
+        row: Row = {"sample": sample.name, "windows": len(left)}
+        for component, name in enumerate("uv"):
+            row[f"mean {name}"] = float(left[:, component].mean())
+            row[f"rms {name}"] = root_mean_square(left[:, component])
+        rows.append(row)
+    return rows + [{"sample": line, "windows": "skipped"} for line in missing]
+
+
 def strain(data: Path, ours: list[Setting] = RECORDINGS) -> list[Row]:
     """Image correlation: root mean square error of u (px, all pixels) and of u_x (1/frame, off the edge).
 
@@ -206,6 +254,9 @@ TABLES = {
     ),
     "uncertainty": report.Table(
         "Intervals on recordings", lambda o: [] if o.data is None else uncertainty(o.data)
+    ),
+    "truth": report.Table(
+        "What the truth leaves of the recordings", lambda o: [] if o.data is None else truth(o.data)
     ),
     "strain": report.Table(
         "Strain from image correlation", lambda o: [] if o.data is None else strain(o.data)
