@@ -1,0 +1,64 @@
+"""Deviations where noise or texture differ from one part of the frame to another: neither far wider nor
+narrower than the errors there."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+import jacoflow
+
+MOTION = (1.3, -0.7)
+APART = 40
+"""Texture beyond the frame on each side, px."""
+
+
+def textured(size, seed, contrast=40.0):
+    """The frame moved by (u, v) px as a function of these, and the generator of its noise."""
+    rng = np.random.default_rng(seed)
+    texture = gaussian_filter(rng.normal(size=(size + 2 * APART,) * 2), 1.5)
+    texture = 128 + contrast * texture / texture.std()
+    y, x = np.indices((size, size)).astype(float)
+    return (lambda u, v: map_coordinates(texture, [y + APART - v, x + APART - u], order=5)), rng
+
+
+@pytest.mark.parametrize("noise", [2.0, 3.0])
+def test_noise_of_a_part_of_the_frame_is_not_taken_for_motion(noise):
+    """Shot noise is stronger where frames are bright: noise of 1 grey level, more in one quarter."""
+    frame, rng = textured(160, 2)
+    y, x = np.indices((160, 160))
+    std = np.where((x > 80) & (y > 80), noise, 1.0)
+    field = jacoflow.flow(*(frame(*move) + std * rng.normal(size=std.shape) for move in ((0, 0), MOTION)))
+    inner = np.s_[89:148, 89:148]
+    error, stated = (field.u - MOTION[0])[inner], field.std("u")[inner]
+    print(f"noise {noise}: rms error {np.sqrt(np.mean(error**2)):.4f}, stated {np.median(stated):.4f}")
+    assert np.mean(np.abs(error) < 2 * stated) > 0.7
+    assert np.median(stated) < 2 * np.sqrt(np.mean(error**2))
+
+
+@pytest.mark.parametrize("radius", [30, 40, 50])
+def test_intervals_of_a_noisy_object_on_black_hold(radius):
+    """A background without noise says nothing of the noise on the object."""
+    held = []
+    for seed in (1, 2, 3):
+        frame, rng = textured(192, seed, contrast=30.0)
+        y, x = np.indices((192, 192)).astype(float)
+        pair = []
+        for u, v in ((0, 0), MOTION):
+            share = 1 / (1 + np.exp(np.hypot(x - 96 - u, y - 96 - v) - radius))
+            noisy = share * frame(u, v) + np.sqrt(share) * rng.normal(size=share.shape)
+            pair.append(np.clip(np.rint(np.where(share > 1e-3, noisy, 0)), 0, 255).astype(np.uint8))
+        field = jacoflow.flow(*pair)
+        inner = field.valid & (np.hypot(x - 96, y - 96) < radius - 14)
+        held.append(np.mean(np.abs(field.u - MOTION[0])[inner] < 2 * field.std("u")[inner]))
+    print(radius, np.round(held, 2))
+    assert min(held) > 0.85
+
+
+@pytest.mark.parametrize("preset", ["fast", "balanced", "accurate"])
+def test_a_strip_of_texture_in_blank_frames_has_bounded_deviations(preset):
+    frame, _ = textured(128, 0)
+    pair = [np.full((128, 128), 128.0) for _ in range(2)]
+    for blank, move in zip(pair, (0.0, MOTION[0]), strict=True):
+        blank[60:70] = frame(move, 0)[60:70]
+    field = jacoflow.flow(*pair, method=jacoflow.CoarseToFine(preset=preset))
+    assert field.valid.any() and field.std("u")[field.valid].max() < 5
