@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import jacoflow
+from benchmarks.scores.flow import intervals
 
 ROOT = Path(__file__).parents[2]
 DATA = Path(os.environ.get("JACOFLOW_DATA", ROOT / ".." / "shared" / "data"))
@@ -59,6 +60,25 @@ def test_errors_are_within_reach(bench, name, frames):
     assert row["share"] > 0.98
     assert row["end_point_error"] <= flow
     assert row["jacobian_error"] <= jacobian
+
+
+@pytest.mark.parametrize("preset", ["fast", "balanced"])
+@pytest.mark.parametrize(
+    "name", ["_rubber_whale", "_dimetrodon", "_yosemite", "_sintel", "_Urban2", "_Venus", "_Sintel cave_2 final"]
+)
+def test_large_errors_have_large_deviations(bench, name, preset):
+    """Of the errors above 1 px few have a deviation below a fifth of them and the status OK: beside motion
+    boundaries the residuals show the motions that windows average away. Without that up to .9 with `fast`."""
+    _, _, samples = bench
+    sample = read(next(reader for reader in samples.FLOWS + samples.LAYERED if reader.__name__ == name))
+    field = jacoflow.flow(*sample.pair(), method=jacoflow.CoarseToFine(preset=preset, time_scheme="pair"))
+    found = intervals(field, sample.truth, sample.truth_std)
+    print(f"{sample.name}: {found}")
+    assert found["silent"] < 0.16
+    # Venus' truth is off by .13 px.
+    if preset == "balanced" and name != "_Venus":
+        assert found["nees"] < 1.5
+        assert min(found["u"], found["v"], found["jacobian"], found["all"]) > 0.88
 
 
 def test_strain_is_better_than_opencv_at_its_best(bench):

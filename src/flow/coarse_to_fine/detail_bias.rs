@@ -15,16 +15,17 @@
 
 use super::data_term::{DataOptions, DataTerm, MEANS, Sums};
 use super::descent::DescentPlan;
-use super::nodes::{NodeAxis, binomial_mean, sites_around};
+use super::nodes::{NodeAxis, NodeSums, Square, binomial_mean, node_sums};
 use super::planes::{LEFT, Planes};
 use super::pyramid::ComparedFrames;
 use super::refine::SITES_PER_NODE;
+use super::unresolved_motion::{explained_energy, unresolved_motion};
 use super::workspace::Workspace;
 use crate::ablation::keeps;
 use crate::image::Spline;
 use crate::math::median;
 use crate::parallel;
-use crate::simd::{Level, SimdReal};
+use crate::simd::SimdReal;
 use std::f64::consts::PI;
 
 /// Binomial means of the sums, so that windows have standard deviations of 3.4, 8.7 and 14.3 px.
@@ -57,11 +58,6 @@ const DOUBTFUL_SHARE: f64 = 0.1;
 /// before.
 const SMOOTHED_NOISE: f64 = 0.48;
 
-/// Sums of `P_uu, P_uv, P_vv`, of the right sides that the motion leaves, and of the residual energy.
-type NodeSums = [f64; MEANS];
-/// Entries `xx, xy, yy` of a symmetric matrix.
-type Square = [f64; 3];
-
 /// What the finest detail says differently, at nodes.
 #[derive(Debug)]
 pub(super) struct DetailBias {
@@ -74,6 +70,8 @@ pub(super) struct DetailBias {
     /// both directions in wide surroundings.
     remainder: Vec<Square>,
     wide_remainder: Vec<[f64; 1]>,
+    /// Variances of unresolved motion, px^2; without a covariance none.
+    unresolved: Vec<Square>,
 }
 
 impl DetailBias {
@@ -93,11 +91,22 @@ impl DetailBias {
         let term = DataTerm::new(plan.simd, DataOptions::default(), pool);
         let mut data = space.planes(motion.width, motion.height, MEANS);
         let smooth_std = residual_std.map(|std| T::from_f64(SMOOTHED_NOISE * std.to_f64()));
-        let mut sums = [(&level.splines, residual_std), (&smoothed, smooth_std)].map(|(splines, std)| {
+        let mut linearise = |splines, std| {
             let views = level.views_of(splines, ComparedFrames::All);
             term.linearise(Sums::Means, (level.size, &views), motion, std, &mut data);
             node_sums(plan.simd, &data, size)
-        });
+        };
+        let smoothed_sums = linearise(&smoothed, smooth_std);
+        let mut sums = [linearise(&level.splines, residual_std), smoothed_sums];
+        let unresolved = if plan.keeps_levels {
+            let mut explained = space.planes(motion.width, motion.height, 1);
+            explained_energy(plan.simd, &data, &mut explained);
+            let found = unresolved_motion(&sums[0], &node_sums(plan.simd, &explained, size), size);
+            space.keep(explained);
+            found
+        } else {
+            Vec::new()
+        };
         smoothed.into_iter().map(Spline::into_memory).for_each(|memory| space.keep(Planes::of_samples(memory)));
         space.keep(data);
         let remainder = mean_squares(&remainders(&sums[0]), MAX_REMAINDER, size);
@@ -130,7 +139,7 @@ impl DetailBias {
             let steps = steps(&narrow, &scatter[0], size);
             correction.iter_mut().zip(&steps).for_each(|(flow, step)| (0..2).for_each(|c| flow[c] += step[c]));
         }
-        Self { axes, correction, scatter, remainder, wide_remainder }
+        Self { axes, correction, scatter, remainder, wide_remainder, unresolved }
     }
 
     /// Removes the bias from the motion and takes the step.
@@ -166,6 +175,11 @@ impl DetailBias {
         ([xx, xy, yy], (1.0 - noise * explained).max(0.0))
     }
 
+    /// Variances of the unresolved motion at a node, px^2.
+    pub fn unresolved(&self, node: usize) -> Square {
+        self.unresolved.get(node).copied().unwrap_or_default()
+    }
+
     /// Mean squared difference around a node in a window of `sigma` px.
     pub fn scatter(&self, node: usize, sigma: f64) -> Square {
         let last = WINDOWS.len() - 2;
@@ -174,20 +188,6 @@ impl DetailBias {
         let (narrow, wide) = (self.scatter[k][node], self.scatter[k + 1][node]);
         std::array::from_fn(|i| narrow[i] + share * (wide[i] - narrow[i]))
     }
-}
-
-/// Sums in triangular windows around the nodes, row by row; they overlap by half.
-fn node_sums<T: SimdReal>(simd: Level, data: &Planes<T>, (columns, rows): (usize, usize)) -> Vec<NodeSums> {
-    let row = |n: usize| {
-        let down = data.weighted_rows(simd, sites_around(n, data.height));
-        let node = |n: usize| {
-            let sum =
-                |k: usize| sites_around(n, data.width).map(|(x, weight)| weight * down.at(k, x, 0).to_f64()).sum();
-            std::array::from_fn(sum)
-        };
-        (0..columns).map(node).collect::<Vec<NodeSums>>()
-    };
-    parallel::map(0..rows, row).concat()
 }
 
 /// Mean squares of vectors whose components are at most `most` px, with a standard deviation of 8 px around

@@ -13,7 +13,7 @@
 //!    three frames are warped by the result and refined once more.
 //! 4. [`peak_locking`], [`detail_bias`]: measure and remove the bias of undersampled texture.
 //! 5. [`acceleration`]: three frames only; from the mean of both steps to the step after the middle frame.
-//! 6. [`covariance`]: error sources measured in the same frames.
+//! 6. [`unresolved_motion`], [`covariance`]: error sources measured in the same frames.
 //! 7. [`output`]: the field at the requested sites, with status and diagnostics, its flow first refined at
 //!    every pixel by [`variational`].
 //!
@@ -48,6 +48,7 @@ mod refine;
 mod regularize;
 mod resample;
 mod schedule;
+mod unresolved_motion;
 mod variational;
 mod workspace;
 

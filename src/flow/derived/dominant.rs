@@ -14,6 +14,8 @@ const CHI2_LIMIT: f64 = 9.21;
 /// Maximum standard deviation, px/frame, of what sites of one motion may differ by beyond their covariance:
 /// the field is smooth where the objects are not.
 const MAX_DEVIATION: f64 = 0.1;
+/// Maximum variance of a site over the median of the region: who knows least must not follow every motion.
+const MAX_VARIANCE: f64 = 4.0;
 /// Refits to the sites that follow.
 const REFITS: usize = 5;
 /// Sites around a given point that candidates are drawn from, as a share of all.
@@ -66,6 +68,16 @@ impl AffineMotion {
     /// Whether a site may belong to the motion: it follows it, or differs by what is allowed at most.
     pub(super) fn may_hold(&self, site: &Site) -> bool {
         self.distance(site, MAX_DEVIATION) < CHI2_LIMIT
+    }
+}
+
+/// Limits the variances of sites that are far less certain than the others, as beside motion boundaries: a
+/// tilted motion between those of both sides would hold them all.
+pub(super) fn limit_variances(sites: &mut [Site]) {
+    let mut variances: Vec<f64> = sites.iter().map(|site| site.covariance.trace()).collect();
+    let Some(median) = central_median(&mut variances).filter(|_| keeps("measure.uncertain_sites")) else { return };
+    for site in sites {
+        site.covariance *= (MAX_VARIANCE * median / site.covariance.trace()).min(1.0);
     }
 }
 

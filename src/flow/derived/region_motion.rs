@@ -2,7 +2,7 @@
 
 use super::Motion;
 use super::common_residual::common_residual;
-use super::dominant::{Site, dominant_motion};
+use super::dominant::{Site, dominant_motion, limit_variances};
 use super::region::{carry_to, sites_in, valid_sites};
 use super::sharing::{in_common, sharing_among};
 use crate::ablation::keeps;
@@ -101,7 +101,7 @@ pub fn fit_region<T: Real>(
     let centre = at.unwrap_or((sum.0 / n, sum.1 / n));
     let scale = [field.layout.units.scale("u"), field.layout.units.scale("v")];
     let valid = valid_sites(field, &inside);
-    let sites: Vec<Site> = valid
+    let mut sites: Vec<Site> = valid
         .iter()
         .flatten()
         .filter_map(|&index| {
@@ -115,6 +115,7 @@ pub fn fit_region<T: Real>(
             is_known.then_some(Site { index, x: x - centre.0, y: y - centre.1, flow, covariance })
         })
         .collect();
+    limit_variances(&mut sites);
     let unknown = RegionMotion {
         motion: [f64::NAN; 6],
         covariance: [[f64::NAN; 6]; 6],

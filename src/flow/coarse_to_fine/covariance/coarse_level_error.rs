@@ -1,13 +1,13 @@
 //! Coarse-level error: finer levels correct coarser ones only where data constrain the motion.
 //!
 //! A coarse level reaches further into an area without texture than a fine one, and is less exact. Its
-//! variances are mean squares of the differences from the refined motion at sites with texture, taken from
-//! mean absolute values, as for Gaussian errors, so that motion boundaries do not dominate. Refinement
+//! variances are mean squares of the differences from the refined motion at sites with texture nearby, taken
+//! from mean absolute values, as for Gaussian errors, so that single large ones do not dominate. Refinement
 //! windows carry such errors out of those areas; where errors grow, slopes err by the rise.
 
 use super::constrained_directions::ConstrainedDirections;
 use crate::flow::coarse_to_fine::data_term::MOTION;
-use crate::flow::coarse_to_fine::nodes::binomial_mean;
+use crate::flow::coarse_to_fine::nodes::{binomial_mean, decaying_sums};
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;
 use crate::simd::SimdReal;
@@ -15,6 +15,10 @@ use std::f64::consts::FRAC_PI_2;
 
 /// Distance that a level reaches into an untextured area, px of the level: its stencils and data windows.
 const LEVEL_REACH: f64 = 4.0;
+/// Distance, nodes, over which the weight of a reference site falls by a factor of e.
+const REFERENCE_DISTANCE: f64 = 3.0;
+/// Weight of the mean of the frame's reference sites, in reference sites: it counts where few are near.
+const FRAME_WEIGHT: f64 = 3.0;
 /// Variance of the slopes over the mean square rise of the flow's standard deviation.
 const RISE_SHARE: f64 = 0.35;
 
@@ -26,19 +30,27 @@ pub(super) struct CoarseLevelError {
 }
 
 pub(super) struct CoarseLevelErrors {
-    /// Of the flow, px^2 of the finest estimated level, and of the slopes; the next coarser level first.
-    variances: Vec<[f64; 2]>,
+    /// Of the flow, px^2 of the finest estimated level, and of the slopes, at every node; the next coarser
+    /// level first. 0 without reference sites.
+    variances: Vec<Vec<[f64; 2]>>,
     constrained: ConstrainedDirections,
 }
 
 impl CoarseLevelErrors {
-    pub fn new<T: SimdReal>(motion: &Planes<T>, coarser: &[Planes<T>], constrained: ConstrainedDirections) -> Self {
-        let mut variances: Vec<[f64; 2]> = Vec::new();
+    pub fn new<T: SimdReal>(
+        motion: &Planes<T>,
+        coarser: &[Planes<T>],
+        constrained: ConstrainedDirections,
+        size: (usize, usize),
+    ) -> Self {
+        let mut variances: Vec<Vec<[f64; 2]>> = Vec::new();
         for (k, coarse) in coarser.iter().enumerate() {
-            let mut found = differences(motion, (coarse, k + 1), &constrained).unwrap_or_default();
+            let mut found = differences(motion, (coarse, k + 1), &constrained, size);
             if let Some(finer) = variances.last() {
                 // Variances do not decrease with the distance.
-                found = [0, 1].map(|kind| found[kind].max(finer[kind]));
+                for (found, finer) in found.iter_mut().zip(finer) {
+                    *found = [0, 1].map(|kind| found[kind].max(finer[kind]));
+                }
             }
             variances.push(found);
         }
@@ -47,8 +59,10 @@ impl CoarseLevelErrors {
 
     pub fn at_nodes(&self, size: (usize, usize)) -> Vec<CoarseLevelError> {
         let distances = (0..size.0 * size.1).map(|n| self.constrained.distance(n % size.0, n / size.0));
-        let own: Vec<[f64; 2]> =
-            distances.map(|distance| [0, 1].map(|kind| self.variance(kind, distance).sqrt())).collect();
+        let own: Vec<[f64; 2]> = distances
+            .enumerate()
+            .map(|(n, distance)| [0, 1].map(|kind| self.variance(kind, distance, n).sqrt()))
+            .collect();
         let mut carried = own.clone();
         binomial_mean(&mut carried, size);
         let deviations = |n: usize| [0, 1].map(|kind| f64::max(own[n][kind], carried[n][kind]));
@@ -80,9 +94,9 @@ impl CoarseLevelErrors {
         (0..own.len()).map(mean).collect()
     }
 
-    /// Variance of the flow (`kind` 0) or slopes (1) at a distance, px, from constraining data: a level's own
-    /// where the next finer one has no data, linear between, 0 below half the finest level's reach.
-    fn variance(&self, kind: usize, distance: f64) -> f64 {
+    /// Variance of the flow (`kind` 0) or slopes (1) of a node at a distance, px, from constraining data: a
+    /// level's own where the next finer one has no data, linear between, 0 below half the finest one's reach.
+    fn variance(&self, kind: usize, distance: f64, node: usize) -> f64 {
         if distance.is_infinite() {
             return self.unverified(kind);
         }
@@ -90,7 +104,7 @@ impl CoarseLevelErrors {
         let (mut from, mut below) = (0.5, 0.0);
         for variances in &self.variances {
             let to = 2.0 * from;
-            let most = variances[kind];
+            let most = variances[node][kind];
             if pixels < to {
                 return below + (most - below) * ((pixels - from) / (to - from)).max(0.0);
             }
@@ -106,27 +120,38 @@ impl CoarseLevelErrors {
     }
 }
 
-/// Mean square differences of flow and slopes from the motion so many levels above, at reference sites.
+/// Mean square differences of flow and slopes from the motion so many levels above, around every node: at
+/// reference sites nearby and, where these are few, of the frame.
 fn differences<T: SimdReal>(
     motion: &Planes<T>,
     (coarse, coarser): (&Planes<T>, usize),
     constrained: &ConstrainedDirections,
-) -> Option<[f64; 2]> {
-    let (mut sums, mut count) = ([0.0; 2], 0.0);
-    let step = (1 << coarser).max(SITES_PER_NODE);
-    let every = |len: usize| (0..len).step_by(step);
-    for (x, y) in every(motion.height).flat_map(|y| every(motion.width).map(move |x| (x, y))) {
-        if !constrained.is_reference(x, y) {
-            continue;
+    size: (usize, usize),
+) -> Vec<[f64; 2]> {
+    let node = |n: usize| {
+        let (x, y) = (SITES_PER_NODE * (n % size.0), SITES_PER_NODE * (n / size.0));
+        // Sites of the coarser level, too.
+        let is_site = (x | y) % (1 << coarser) == 0 && x < motion.width && y < motion.height;
+        if !is_site || !constrained.is_reference(x, y) {
+            return [0.0; 3];
         }
+        let mut sums = [0.0, 0.0, 1.0];
         for k in 0..MOTION {
-            let scale = if k < 2 { f64::from(1u32 << coarser) } else { 1.0 };
+            let (scale, share) = if k < 2 { (f64::from(1u32 << coarser), 1.0 / 2.0) } else { (1.0, 1.0 / 4.0) };
             let there = scale * coarse.line(k, y >> coarser)[x >> coarser].to_f64();
-            sums[usize::from(k >= 2)] += (motion.line(k, y)[x].to_f64() - there).abs();
+            sums[usize::from(k >= 2)] += share * (motion.line(k, y)[x].to_f64() - there).abs();
         }
-        count += 1.0;
-    }
-    (count > 0.0).then(|| [sums[0] / 2.0, sums[1] / 4.0].map(|sum| FRAC_PI_2 * (sum / count).powi(2)))
+        sums
+    };
+    let mut sums: Vec<[f64; 3]> = (0..size.0 * size.1).map(node).collect();
+    let of_frame = sums.iter().fold([0.0; 3], |all, sums| [0, 1, 2].map(|k| all[k] + sums[k]));
+    let frame_share = FRAME_WEIGHT / of_frame[2].max(1.0);
+    decaying_sums(&mut sums, size, (-1.0 / REFERENCE_DISTANCE).exp());
+    let square = |sums: &[f64; 3], k: usize| {
+        let [sum, count] = [k, 2].map(|k| sums[k] + frame_share * of_frame[k]);
+        if count > 0.0 { FRAC_PI_2 * (sum / count).powi(2) } else { 0.0 }
+    };
+    sums.iter().map(|sums| [square(sums, 0), square(sums, 1)]).collect()
 }
 
 /// Mean square rise of values next to a node, per px: for each axis that of both sides.
@@ -170,7 +195,7 @@ mod tests {
         let (constrained, nodes) = but_for(side, 24..73);
         // Errors of .1 and .5 px of the finest level, and of .01 and .02 in the slopes.
         let coarser = [constant(49, 0.5 * 1.1, 0.01), constant(25, 0.25 * 1.5, -0.02)];
-        let errors = CoarseLevelErrors::new(&constant(side, 1.0, 0.0), &coarser, constrained);
+        let errors = CoarseLevelErrors::new(&constant(side, 1.0, 0.0), &coarser, constrained, (nodes, nodes));
         let variances = errors.at_nodes((nodes, nodes));
         let middle = &variances[nodes * (nodes / 2) + nodes / 2];
         assert_eq!(middle.directions, [1.0, 0.0, 1.0]);
@@ -183,5 +208,24 @@ mod tests {
         let row: Vec<f64> = (0..=nodes / 2).map(|x| variances[nodes * (nodes / 2) + x].variances[0]).collect();
         assert_eq!(row[..4], [0.0; 4]);
         assert!(row.windows(2).all(|pair| pair[0] <= pair[1]));
+    }
+
+    #[test]
+    fn errors_are_those_of_the_surroundings() {
+        let side = 97usize;
+        let nodes = side.div_ceil(SITES_PER_NODE);
+        let is_plain = |n: usize| (36..61).contains(&(n / side));
+        let sites: Vec<UnconstrainedDirections> =
+            (0..side * side).map(|n| if is_plain(n) { ALL } else { NONE }).collect();
+        let constrained = ConstrainedDirections::with((side, &sites), (nodes, nodes), |_| true);
+        // The coarser level errs by .4 px, in the right half only.
+        let mut coarser = constant(49, 0.5, 0.0);
+        for (k, y) in (0..2).flat_map(|k| (0..49).map(move |y| (k, y))) {
+            coarser.line_mut(k, y)[24..].fill(0.5 * 1.4);
+        }
+        let errors = CoarseLevelErrors::new(&constant(side, 1.0, 0.0), &[coarser], constrained, (nodes, nodes));
+        let variances = errors.at_nodes((nodes, nodes));
+        let [left, right] = [4, 20].map(|x| variances[nodes * (nodes / 2) + x].variances[0].sqrt());
+        assert!(left < 0.2 * right && right > 0.4, "{left}, {right}");
     }
 }

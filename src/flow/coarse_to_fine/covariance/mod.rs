@@ -11,6 +11,7 @@
 //! * Coarse-level error ([`coarse_level_error`]): without texture, or with texture of one direction only
 //!   ([`constrained_directions`]), finer levels do not correct coarser ones.
 //! * Motion boundaries ([`boundary_error`]): a site near one may have the motion of the other side.
+//! * Unresolved motion ([`unresolved_motion`]): sites of a window may have motions of their own.
 //! * Remainder ([`DetailBias`](super::detail_bias::DetailBias)): what the frames would still change in narrow
 //!   windows, beyond noise.
 //! * Peak locking ([`PeakLocking`]): a share of the correction may remain.
@@ -30,7 +31,7 @@ mod first_frame;
 mod map;
 mod noise;
 
-use super::{estimate::Estimate, nodes::NodeAxis, peak_locking::PeakLocking, planes::Planes};
+use super::{estimate::Estimate, nodes::NodeAxis, peak_locking::PeakLocking, planes::Planes, unresolved_motion};
 use crate::ablation::keeps;
 use crate::flow::symmetric::{ENTRIES, upper};
 use crate::parallel;
@@ -117,7 +118,8 @@ pub(super) fn covariance<T: SimdReal>(
     let (coarse_errors, mut nodes) = parallel::join(
         || {
             let constrained = ConstrainedDirections::new(&estimate.data, &noise, (width, height));
-            CoarseLevelErrors::new(&estimate.motion, &estimate.coarser_motions, constrained).at_nodes((width, height))
+            CoarseLevelErrors::new(&estimate.motion, &estimate.coarser_motions, constrained, (width, height))
+                .at_nodes((width, height))
         },
         || curvature_bias::curvature_bias(simd, &estimate.motion, statistics, CURVATURE_SHARES[kind]),
     );
@@ -153,6 +155,10 @@ pub(super) fn covariance<T: SimdReal>(
             let of_level = if estimate.level == 0 { 1.0 } else { COARSE_DETAIL_SHARE };
             let beyond_noise = of_level * (1.0 - NOISE_IN_DETAIL * noise / (scatter[0] + scatter[2])).max(0.0);
             add_blocks(node, DETAIL_SHARES.map(|share| share * beyond_noise), &scatter);
+        }
+        if let Some(detail) = estimate.detail.as_ref().filter(|_| keeps("flow.unresolved_motion")) {
+            let slopes = unresolved_motion::SLOPE_SHARE;
+            add_blocks(node, [1.0, slopes, slopes], &detail.unresolved(n));
         }
         if let Some(detail) = estimate.detail.as_ref().filter(|_| keeps("flow.remainder")) {
             let (square, share) = detail.remainder(n, &remaining.density);
