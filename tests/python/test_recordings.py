@@ -74,7 +74,7 @@ def test_large_errors_have_large_deviations(bench, name, preset):
     field = jacoflow.flow(*sample.pair(), method=jacoflow.CoarseToFine(preset=preset, time_scheme="pair"))
     found = intervals(field, sample.truth, sample.truth_std)
     print(f"{sample.name}: {found}")
-    assert found["silent"] < 0.16
+    assert found["silent"] < (0.1 if preset == "balanced" else 0.16)
     # Venus' truth is off by .13 px.
     if preset == "balanced" and name != "_Venus":
         assert found["nees"] < 1.5

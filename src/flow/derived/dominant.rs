@@ -14,7 +14,7 @@ const CHI2_LIMIT: f64 = 9.21;
 /// Maximum standard deviation, px/frame, of what sites of one motion may differ by beyond their covariance:
 /// the field is smooth where the objects are not.
 const MAX_DEVIATION: f64 = 0.1;
-/// Maximum variance of a site over the median of the region: who knows least must not follow every motion.
+/// Maximum variance of a site over the median of the region's: uncertain ones would follow every motion.
 const MAX_VARIANCE: f64 = 4.0;
 /// Refits to the sites that follow.
 const REFITS: usize = 5;

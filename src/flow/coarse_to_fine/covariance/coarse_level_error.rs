@@ -6,6 +6,7 @@
 //! windows carry such errors out of those areas; where errors grow, slopes err by the rise.
 
 use super::constrained_directions::ConstrainedDirections;
+use crate::ablation::keeps;
 use crate::flow::coarse_to_fine::data_term::MOTION;
 use crate::flow::coarse_to_fine::nodes::{binomial_mean, decaying_sums};
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
@@ -146,7 +147,11 @@ fn differences<T: SimdReal>(
     let mut sums: Vec<[f64; 3]> = (0..size.0 * size.1).map(node).collect();
     let of_frame = sums.iter().fold([0.0; 3], |all, sums| [0, 1, 2].map(|k| all[k] + sums[k]));
     let frame_share = FRAME_WEIGHT / of_frame[2].max(1.0);
-    decaying_sums(&mut sums, size, (-1.0 / REFERENCE_DISTANCE).exp());
+    if keeps("flow.nearby_level_errors") {
+        decaying_sums(&mut sums, size, (-1.0 / REFERENCE_DISTANCE).exp());
+    } else {
+        sums.fill([0.0; 3]);
+    }
     let square = |sums: &[f64; 3], k: usize| {
         let [sum, count] = [k, 2].map(|k| sums[k] + frame_share * of_frame[k]);
         if count > 0.0 { FRAC_PI_2 * (sum / count).powi(2) } else { 0.0 }
