@@ -82,20 +82,38 @@ def shifts(seeds: tuple[int, ...]) -> list[Row]:
 
 
 def correlated(one: Array, other: Array, side: int = 64) -> tuple[Array, Array]:
-    """Displacements of windows by the peak of their cross-correlation, and the windows' middles, (n, 2)."""
+    """Displacements of windows by the peak of their cross-correlation, and where they are in the first frame,
+    (n, 2). The second time windows are offset by the first displacement, half in each frame: so they show the
+    same particles, those at the middle of both exposures. Peaks are fitted by Gaussians, particles' own shape
+    (J. Westerweel, Meas. Sci. Technol. 8, 1997)."""
     places, found = [], []
     for y in range(0, one.shape[0] - side + 1, side // 2):
         for x in range(0, one.shape[1] - side + 1, side // 2):
-            a, b = (frame[y : y + side, x : x + side] for frame in (one, other))
-            spectrum = np.conj(np.fft.rfft2(a - a.mean())) * np.fft.rfft2(b - b.mean())
-            surface = np.fft.fftshift(np.fft.irfft2(spectrum))
-            j, i = np.unravel_index(surface.argmax(), surface.shape)
-            if 0 < j < side - 1 and 0 < i < side - 1:
-                lines = (surface[j, i - 1 : i + 2], surface[j - 1 : j + 2, i])
-                peak = [0.5 * (low - high) / (low - 2 * top + high) for low, top, high in lines]
-                places.append((x + side / 2, y + side / 2))
-                found.append((i - side / 2 + peak[0], j - side / 2 + peak[1]))
+            rough = displacement(one, other, (x, y), np.zeros(2), side)
+            moved = None if rough is None else displacement(one, other, (x, y), np.rint(rough), side)
+            if moved is not None:
+                places.append((x + side / 2, y + side / 2) - moved / 2)
+                found.append(moved)
     return np.array(places), np.array(found)
+
+
+def displacement(one: Array, other: Array, corner: tuple[int, int], offset: Array, side: int) -> Array | None:
+    """Of windows that lie `offset` px apart; None beyond the frames or without a peak."""
+    before = np.array(corner) - (offset // 2).astype(int)
+    after = before + offset.astype(int)
+    if min(*before, *after) < 0 or (np.maximum(before, after) + side > one.shape[::-1]).any():
+        return None
+    a, b = (frame[y : y + side, x : x + side] for frame, (x, y) in ((one, before), (other, after)))
+    spectrum = np.conj(np.fft.rfft2(a - a.mean())) * np.fft.rfft2(b - b.mean())
+    surface = np.fft.fftshift(np.fft.irfft2(spectrum))
+    j, i = np.unravel_index(surface.argmax(), surface.shape)
+    if min(i, j) == 0 or max(i, j) == side - 1:
+        return None
+    peak = np.array([surface[j, i - 1 : i + 2], surface[j - 1 : j + 2, i]])
+    if peak.min() <= 0:
+        return None
+    low, top, high = np.log(peak).T
+    return offset + [i - side / 2, j - side / 2] + 0.5 * (low - high) / (low - 2 * top + high)
 
 
 def kitti(path: Path) -> Array:
@@ -118,7 +136,7 @@ def recordings(data: Path | None) -> list[Row]:
         one, other = (frame.astype(float) for frame in pair)
         by_hand = (other - other.mean()) / other.std() * one.std() + one.mean()
         places, wanted = correlated(one, other)
-        columns, lines = places.astype(int).T
+        columns, lines = np.rint(places).astype(int).T
         for what, second in (("as recorded", other), ("equalised by hand", by_hand)):
             distances = {
                 name: float(np.median(np.linalg.norm(flow[lines, columns] - wanted, axis=-1)))
