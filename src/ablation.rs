@@ -33,6 +33,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("flow.step_scatter", "steps where the finest detail disagrees are shorter"),
     ("flow.step_side", "narrow frames take no step"),
     ("flow.wide_remainder", "chance is compared in wide surroundings, too, before what is left widens the covariance"),
+    ("flow.coarse_constraints", "coarser levels determine the motion where their own data do"),
     ("flow.nearby_level_errors", "errors of coarse levels are those of the sites around, not of the frame"),
     ("flow.unresolved_motion", "motions of single sites that residuals show widen the covariance"),
     ("flow.remainder", "what the frames leave of the flow in narrow windows widens its covariance"),

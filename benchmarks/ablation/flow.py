@@ -3,8 +3,8 @@ motions, beside a motion boundary (of three frames too), beside a mask's edge an
 errors, px; share of errors above 1 px that neither status nor standard deviation states; share of the sites
 of independent noise that are valid; change by saturated pixels, standard deviations; bias of pairs in noise,
 px; errors in waves and in narrow frames, px; share of errors outside 95 % intervals, of undersampled texture
-and of discs that smoothness holds back, whose own errors are relative to their motion; time on equal
-frames."""
+and of discs that smoothness holds back, whose own errors are relative to their motion; standard deviation of
+faint texture, px; time on equal frames."""
 
 from __future__ import annotations
 
@@ -31,6 +31,8 @@ NARROW, NARROW_SHIFT = 6, (1.3, -0.6)
 """Height of frames that are few windows high, and their motion, px."""
 BESIDE, MASKED_SHIFT = 12, (2.6, -1.3)
 """Width of what is compared beside a mask's edge, and the motion there, px."""
+FAINT_SHIFT = (1.3, -0.7)
+"""Motion of faint texture, px; errors are a tenth of a pixel."""
 RADIUS, ANGLES = 20.0, (0.02, 0.04)
 """Of discs, px, and their turns, rad."""
 SHIFTS = ((56, 0), (0, -64), (80, 60))
@@ -40,7 +42,7 @@ def rows() -> dict[str, list[float]]:
     """One value for each change and seed, each seed, each shift and seed."""
     names = (
         "equal", "changed", "specks", "shifts", "boundary", "three frames", "silent", "unrelated", "undersampled", "noise",
-        "waves", "narrow", "mask", "outside", "discs", "disc errors", "ms",
+        "waves", "narrow", "mask", "outside", "discs", "disc errors", "faint", "ms",
     )
     found: dict[str, list[float]] = {name: [] for name in names}
     for seed in SEEDS:
@@ -90,6 +92,8 @@ def rows() -> dict[str, list[float]]:
         field = jacoflow.flow(*strip, covariance=False, threads=1).flow - np.array(NARROW_SHIFT)
         found["narrow"].append(float(np.sqrt(np.mean(np.sum(field[:, 8:-8] ** 2, axis=-1)))))
         found["mask"].append(beside_mask(seed))
+        faint = jacoflow.flow(*scenes.faint(seed, FAINT_SHIFT), threads=1).std("u")
+        found["faint"].append(float(np.median(faint[scenes.FAINT : -scenes.MARGIN, scenes.MARGIN : -scenes.MARGIN])))
     for shift, seed in itertools.product(SHIFTS, SEEDS):
         field = jacoflow.flow(*scenes.shifted_speckle(seed, shift), covariance=False, threads=1)
         distance = np.linalg.norm(field.flow - np.array(shift), axis=-1)

@@ -16,6 +16,8 @@ MARGIN = 24
 """Of the texture around the frame, px; also left out along each side of the field."""
 LARGE = (480, 640)
 """Height and width of the frames with saturated pixels."""
+FAINT = 110
+"""First row of the faint texture that is compared, px."""
 _X = np.linspace(0, 1, SIZE[1])
 CHANGES: dict[str, Callable[[Array], Array]] = {
     "gain .5": lambda frame: 0.5 * frame,
@@ -135,6 +137,17 @@ def undersampled(seed: int, shift: tuple[float, float], side: int = 160) -> list
         return np.rint(60 + 6 * sum(terms, np.zeros_like(x)) / np.sqrt(WAVES / 2))
 
     return [frame(0, 0), frame(*shift)]
+
+
+def faint(seed: int, shift: tuple[float, float]) -> list[Array]:
+    """Two frames in which a faint texture, no stronger than the noise in its gradients, moves below a strong
+    one that moves differently."""
+    picture = texture(seed)
+    weak = gaussian_filter(np.random.default_rng(seed).standard_normal(picture.shape), 3.0)
+    weak *= 3.0 / weak.std()
+    is_strong = np.indices(SIZE)[0] < FAINT - MARGIN
+    frames = [np.where(is_strong, 40 * view(picture, (5.0 * k, 0.0)), view(weak, (k * shift[0], k * shift[1]))) for k in (0, 1)]
+    return [noisy(120 + frame, 10 * seed + k) for k, frame in enumerate(frames)]
 
 
 def waves(seed: int, size: int = 160, wavelength: float = 40.0) -> tuple[list[Array], Array]:

@@ -6,6 +6,7 @@ import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 import jacoflow
+from benchmarks.scenes import disturbed
 
 MOTION = (1.3, -0.7)
 APART = 40
@@ -95,3 +96,34 @@ def test_rounding_in_a_blank_half_is_not_taken_for_motion(dtype):
         picture[:, 64:] = 128
     one, other = (jacoflow.flow(*pair, simd=simd).std("u") for simd in ("scalar", None))
     assert np.max(np.abs(one / other - 1)) < 0.1
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_faint_texture_has_about_the_deviations_of_its_errors(seed):
+    """Only frames that are smoothed show it beneath the noise: coarser levels determine its motion. From the
+    finest level alone deviations are two pixels."""
+    field = jacoflow.flow(*disturbed.faint(seed, MOTION))
+    inner = np.s_[disturbed.FAINT : -disturbed.MARGIN, disturbed.MARGIN : -disturbed.MARGIN]
+    error, stated = (field.flow - np.array(MOTION))[inner], np.stack([field.std("u"), field.std("v")], axis=-1)[inner]
+    print(f"rms error {np.sqrt(np.mean(error**2)):.3f}, stated {np.median(stated):.3f}")
+    assert np.mean(np.abs(error) < 1.96 * stated) > 0.95
+    assert np.median(stated) < 0.6
+
+
+def test_texture_blurred_into_a_plain_area_does_not_determine_its_motion():
+    """Without noise the smallest gradients of smoothed frames seem to show a motion."""
+    size, turn = 176, 0.04
+    y, x = np.indices((size, size)).astype(float) - size / 2
+    rng = np.random.default_rng(3)
+    texture = gaussian_filter(rng.normal(size=(size + 2 * APART,) * 2), 1.5)
+    texture = 128 + 40 * texture / texture.std()
+    texture[: APART + 88] = 128
+    flow = np.stack([-turn * y, turn * x], axis=-1)
+    at = np.stack([y + flow[..., 1], x + flow[..., 0]]) + APART + size / 2
+    frames = [map_coordinates(texture, at, order=5), texture[APART:-APART, APART:-APART]]
+    field = jacoflow.flow(*frames)
+    error = np.linalg.norm(field.flow - flow, axis=-1)
+    stated = np.hypot(field.std("u"), field.std("v"))
+    is_silent = (error > 1) & (stated < error / 5) & (field.status == jacoflow.Status.OK)
+    print(f"errors above 1 px {np.mean(error > 1):.3f}, silent {np.mean(is_silent):.3f}")
+    assert np.mean(is_silent[8:-8, 8:-8]) < 0.01

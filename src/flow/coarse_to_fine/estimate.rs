@@ -1,6 +1,7 @@
 //! What the stages leave for covariance and output.
 
 use super::brightness_scale::BrightnessScale;
+use super::descent::CoarserLevel;
 use super::detail_bias::DetailBias;
 use super::peak_locking::PeakLocking;
 use super::planes::Planes;
@@ -29,14 +30,15 @@ pub(super) struct Estimate<T> {
     pub detail: Option<DetailBias>,
     /// Peak locking before it was removed.
     pub locking: PeakLocking,
-    /// Motion on each coarser level, the finest first; empty without covariance.
-    pub coarser_motions: Vec<Planes<T>>,
+    /// The coarser levels, the finest first; empty without covariance.
+    pub coarser: Vec<CoarserLevel<T>>,
 }
 
 impl<T: SimdReal> Estimate<T> {
     /// Returns all planes.
     pub fn recycle(self, workspace: &Workspace<T>) {
         let statistics = self.statistics.into_iter().chain(self.acceleration).flat_map(WindowStatistics::into_planes);
-        statistics.chain(self.coarser_motions).chain([self.motion, self.data]).for_each(|p| workspace.space.keep(p));
+        statistics.chain([self.motion, self.data]).for_each(|planes| workspace.space.keep(planes));
+        self.coarser.into_iter().for_each(|level| level.recycle(&workspace.space));
     }
 }

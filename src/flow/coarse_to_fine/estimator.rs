@@ -123,7 +123,7 @@ fn estimate<T: SimdReal>(
         // contains what the windows of the data term smooth away.
         statistics.into_iter().flat_map(WindowStatistics::into_planes).for_each(|planes| workspace.space.keep(planes));
         let mut better = plan.relinearise(workspace, &motion);
-        better.coarser_motions = found.coarser_motions;
+        better.coarser = found.coarser;
         for planes in [motion, found.motion, found.data] {
             workspace.space.keep(planes);
         }
@@ -131,7 +131,7 @@ fn estimate<T: SimdReal>(
         (motion, statistics) =
             refine(simd, &workspace.space, &RefineOptions::relinearised(), &found.motion, &found.data);
     }
-    let DescentResult { motion: mut regularized, data, residual_std, coarser_motions } = found;
+    let DescentResult { motion: mut regularized, data, residual_std, coarser } = found;
     let locking = PeakLocking::measure(
         simd,
         (&workspace.pyramid.levels()[plan.finest], ComparedFrames::All),
@@ -161,6 +161,6 @@ fn estimate<T: SimdReal>(
         acceleration,
         detail,
         locking,
-        coarser_motions,
+        coarser,
     }
 }

@@ -1,13 +1,15 @@
 //! Coarse-level error: finer levels correct coarser ones only where data constrain the motion.
 //!
 //! A coarse level reaches further into an area without texture than a fine one, and is less exact. Its
-//! variances are mean squares of the differences from the refined motion at sites with texture nearby, taken
-//! from mean absolute values, as for Gaussian errors, so that single large ones do not dominate. Refinement
-//! windows carry such errors out of those areas; where errors grow, slopes err by the rise.
+//! variances are mean squares of the differences from the refined motion at sites nearby whose motion the
+//! data of a finer level determine, taken from mean absolute values, as for Gaussian errors, so that single
+//! large ones do not dominate. Refinement windows carry such errors out of those areas; where errors grow,
+//! slopes err by the rise.
 
 use super::constrained_directions::ConstrainedDirections;
 use crate::ablation::keeps;
 use crate::flow::coarse_to_fine::data_term::MOTION;
+use crate::flow::coarse_to_fine::descent::CoarserLevel;
 use crate::flow::coarse_to_fine::nodes::{binomial_mean, decaying_sums};
 use crate::flow::coarse_to_fine::planes::{Planes, SITE_SPACING};
 use crate::flow::coarse_to_fine::refine::SITES_PER_NODE;
@@ -18,8 +20,8 @@ use std::f64::consts::FRAC_PI_2;
 const LEVEL_REACH: f64 = 4.0;
 /// Distance, nodes, over which the weight of a reference site falls by a factor of e.
 const REFERENCE_DISTANCE: f64 = 3.0;
-/// Weight of the mean of the frame's reference sites, in reference sites: it counts where few are near.
-const FRAME_WEIGHT: f64 = 3.0;
+/// Weight of the mean of the frame's reference sites, in reference sites: it counts where none are near.
+const FRAME_WEIGHT: f64 = 0.2;
 /// Variance of the slopes over the mean square rise of the flow's standard deviation.
 const RISE_SHARE: f64 = 0.35;
 
@@ -40,13 +42,13 @@ pub(super) struct CoarseLevelErrors {
 impl CoarseLevelErrors {
     pub fn new<T: SimdReal>(
         motion: &Planes<T>,
-        coarser: &[Planes<T>],
+        coarser: &[CoarserLevel<T>],
         constrained: ConstrainedDirections,
         size: (usize, usize),
     ) -> Self {
         let mut variances: Vec<Vec<[f64; 2]>> = Vec::new();
         for (k, coarse) in coarser.iter().enumerate() {
-            let mut found = differences(motion, (coarse, k + 1), &constrained, size);
+            let mut found = differences(motion, (&coarse.motion, k + 1), &constrained, size);
             if let Some(finer) = variances.last() {
                 // Variances do not decrease with the distance.
                 for (found, finer) in found.iter_mut().zip(finer) {
@@ -133,7 +135,7 @@ fn differences<T: SimdReal>(
         let (x, y) = (SITES_PER_NODE * (n % size.0), SITES_PER_NODE * (n / size.0));
         // Sites of the coarser level, too.
         let is_site = (x | y) % (1 << coarser) == 0 && x < motion.width && y < motion.height;
-        if !is_site || !constrained.is_reference(x, y) {
+        if !is_site || !constrained.is_reference(coarser, x, y) {
             return [0.0; 3];
         }
         let mut sums = [0.0, 0.0, 1.0];
@@ -186,6 +188,10 @@ mod tests {
         (ConstrainedDirections::with((side, &sites), (nodes, nodes), |_| true), nodes)
     }
 
+    fn level(motion: Planes<f64>) -> CoarserLevel<f64> {
+        CoarserLevel { motion, data: Planes::new(0, 0, 0) }
+    }
+
     fn constant(side: usize, flow: f64, slope: f64) -> Planes<f64> {
         let mut motion = Planes::new(side, side, MOTION);
         for (k, y) in (0..MOTION).flat_map(|k| (0..side).map(move |y| (k, y))) {
@@ -199,7 +205,7 @@ mod tests {
         let side = 97;
         let (constrained, nodes) = but_for(side, 24..73);
         // Errors of .1 and .5 px of the finest level, and of .01 and .02 in the slopes.
-        let coarser = [constant(49, 0.5 * 1.1, 0.01), constant(25, 0.25 * 1.5, -0.02)];
+        let coarser = [constant(49, 0.5 * 1.1, 0.01), constant(25, 0.25 * 1.5, -0.02)].map(level);
         let errors = CoarseLevelErrors::new(&constant(side, 1.0, 0.0), &coarser, constrained, (nodes, nodes));
         let variances = errors.at_nodes((nodes, nodes));
         let middle = &variances[nodes * (nodes / 2) + nodes / 2];
@@ -228,7 +234,7 @@ mod tests {
         for (k, y) in (0..2).flat_map(|k| (0..49).map(move |y| (k, y))) {
             coarser.line_mut(k, y)[24..].fill(0.5 * 1.4);
         }
-        let errors = CoarseLevelErrors::new(&constant(side, 1.0, 0.0), &[coarser], constrained, (nodes, nodes));
+        let errors = CoarseLevelErrors::new(&constant(side, 1.0, 0.0), &[level(coarser)], constrained, (nodes, nodes));
         let variances = errors.at_nodes((nodes, nodes));
         let [left, right] = [4, 20].map(|x| variances[nodes * (nodes / 2) + x].variances[0].sqrt());
         assert!(left < 0.2 * right && right > 0.4, "{left}, {right}");

@@ -110,6 +110,9 @@ pub(super) fn covariance<T: SimdReal>(
     let support = DataSupport::new(&estimate.data, (width, height));
     let data = (&estimate.data, &support);
     let noise = Noise::new(statistics, data, energy, is_pair);
+    let constrained = ConstrainedDirections::new(&estimate.data, &estimate.coarser, &noise, (width, height));
+    let coarse_densities: Vec<Option<[f64; 3]>> =
+        (0..width * height).map(|n| constrained.coarse_density(&noise, n % width, n / width)).collect();
     let textured_support = textured_support(&noise, &estimate.data, (width, height));
     let textured_support = textured_support.as_ref().unwrap_or(&support);
     let extrapolation = Extrapolation::new(&estimate.motion, statistics, textured_support);
@@ -117,8 +120,7 @@ pub(super) fn covariance<T: SimdReal>(
     // Beside each other: one thread does much of either.
     let (coarse_errors, mut nodes) = parallel::join(
         || {
-            let constrained = ConstrainedDirections::new(&estimate.data, &noise, (width, height));
-            CoarseLevelErrors::new(&estimate.motion, &estimate.coarser_motions, constrained, (width, height))
+            CoarseLevelErrors::new(&estimate.motion, &estimate.coarser, constrained, (width, height))
                 .at_nodes((width, height))
         },
         || curvature_bias::curvature_bias(simd, &estimate.motion, statistics, CURVATURE_SHARES[kind]),
@@ -136,12 +138,12 @@ pub(super) fn covariance<T: SimdReal>(
         let at = (n % width, n / width);
         let motion = curvature_bias::motion_at(&estimate.motion, at);
         let mut noise_part = [0.0; ENTRIES];
-        let remaining = noise.at(at.0, at.1);
+        let remaining = noise.at(at.0, at.1, coarse_densities[n]);
         add_noise(&mut noise_part, &remaining, [FLOW_NOISE_FACTOR[kind], SLOPE_NOISE_FACTOR]);
         if let Some(change) = &change {
             add_noise(
                 &mut noise_part,
-                &change.at(at.0, at.1),
+                &change.at(at.0, at.1, None),
                 [CHANGE_NOISE_FACTOR * FLOW_NOISE_FACTOR[kind], CHANGE_NOISE_FACTOR * SLOPE_NOISE_FACTOR],
             );
         }
@@ -151,7 +153,8 @@ pub(super) fn covariance<T: SimdReal>(
         if let Some(detail) = estimate.detail.as_ref().filter(|_| keeps("flow.detail_scatter")) {
             let [sigma, _] = statistics.mean_sigmas(at.0, at.1);
             let scatter = detail.scatter(n, sigma);
-            let noise = FLOW_NOISE_FACTOR[kind] * remaining.flow * (remaining.density[0] + remaining.density[2]);
+            let [[d_uu, _, d_vv], _] = remaining.densities;
+            let noise = FLOW_NOISE_FACTOR[kind] * remaining.flow * (d_uu + d_vv);
             let of_level = if estimate.level == 0 { 1.0 } else { COARSE_DETAIL_SHARE };
             let beyond_noise = of_level * (1.0 - NOISE_IN_DETAIL * noise / (scatter[0] + scatter[2])).max(0.0);
             add_blocks(node, DETAIL_SHARES.map(|share| share * beyond_noise), &scatter);
@@ -161,7 +164,7 @@ pub(super) fn covariance<T: SimdReal>(
             add_blocks(node, [1.0, slopes, slopes], &detail.unresolved(n));
         }
         if let Some(detail) = estimate.detail.as_ref().filter(|_| keeps("flow.remainder")) {
-            let (square, share) = detail.remainder(n, &remaining.density);
+            let (square, share) = detail.remainder(n, &remaining.densities[0]);
             add_blocks(node, [REMAINDER_SHARE * share, 0.0, 0.0], &square);
         }
         add_locking(node, &motion, &estimate.locking);
@@ -199,7 +202,8 @@ fn textured_support<T: SimdReal>(noise: &Noise<'_, T>, data: &Planes<T>, size: (
 }
 
 fn add_noise(node: &mut Entries, noise: &RemainingNoise, [flow, slopes]: [f64; 2]) {
-    add_blocks(node, [flow * noise.flow, slopes * noise.slopes[0], slopes * noise.slopes[1]], &noise.density);
+    add_blocks(node, [flow * noise.flow, 0.0, 0.0], &noise.densities[0]);
+    add_blocks(node, [0.0, slopes * noise.slopes[0], slopes * noise.slopes[1]], &noise.densities[1]);
 }
 
 /// Adds a symmetric matrix `xx, xy, yy` times a factor to the blocks of the flow and its derivatives.

@@ -20,6 +20,7 @@ use super::{data_support::DataSupport, data_support::Edge};
 use crate::flow::coarse_to_fine::data_term::{SEEN, UU, UV, VV};
 use crate::flow::coarse_to_fine::planes::Planes;
 use crate::flow::coarse_to_fine::refine::{SITES_PER_NODE, TERMS, WindowStatistics};
+use crate::image::halved_noise;
 use crate::simd::SimdReal;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -83,9 +84,10 @@ fn of_white_noise(power: i32) -> f64 {
     terms().flat_map(|(c, m)| terms().map(move |(d, n)| c * d * (2.0 / f64::from(m + n)).powi(power))).sum()
 }
 
-/// Remaining noise at a node: the density matrix `D_uu, D_uv, D_vv`, px^4, and its shares.
+/// Remaining noise at a node: the density matrices `D_uu, D_uv, D_vv` of the flow and of its slopes, px^4,
+/// and their shares.
 pub(super) struct RemainingNoise {
-    pub density: [f64; 3],
+    pub densities: [[f64; 3]; 2],
     pub flow: f64,
     pub slopes: [f64; 2],
 }
@@ -157,7 +159,30 @@ impl<'a, T: SimdReal> Noise<'a, T> {
 
     /// Mean information of the sites near a node with which data constrain the motion.
     pub fn sufficient_information(&self, x: usize, y: usize) -> f64 {
-        (self.white_information + MIN_CONSTRAINING_INFORMATION) * self.energy(x, y)
+        self.sufficient(self.energy(x, y))
+    }
+
+    fn sufficient(&self, energy: f64) -> f64 {
+        (self.white_information + MIN_CONSTRAINING_INFORMATION) * energy
+    }
+
+    /// The same for a site of a level so many above, from its residual energy.
+    pub fn sufficient_on_coarser(&self, level: usize, energy: f64) -> f64 {
+        self.sufficient(self.at_least(level, energy))
+    }
+
+    /// Density of the noise at a site of a level so many above, px^4 of this one, from its information and
+    /// residual energy.
+    pub fn density_on_coarser(&self, level: usize, information: [f64; 3], energy: f64) -> [f64; 3] {
+        let energy = self.at_least(level, energy);
+        let scale = self.excess * energy * 16f64.powi(level as i32);
+        inverse_without_noise(information, self.white_information * energy).map(|entry| entry * scale)
+    }
+
+    /// The residual energy of a level so many above, but no less than the noise leaves.
+    fn at_least(&self, level: usize, energy: f64) -> f64 {
+        let (Energy::Known(floor) | Energy::AtLeast(floor)) = self.energy;
+        energy.max(floor * halved_noise().powi(level as i32))
     }
 
     /// Directions in which this mean information of the sites near a node does not constrain the motion.
@@ -176,7 +201,9 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         [0.5 * (1.0 - cosine), -0.5 * sine, 0.5 * (1.0 + cosine)].map(|entry| entry as f32)
     }
 
-    pub fn at(&self, x: usize, y: usize) -> RemainingNoise {
+    /// At a node; of the flow with no greater density than on a `coarse` level whose data determine its
+    /// motion.
+    pub fn at(&self, x: usize, y: usize, coarse: Option<[f64; 3]>) -> RemainingNoise {
         let energy = self.energy(x, y);
         let inverse = inverse_without_noise(
             positive_definite(self.statistics.information(x, y)),
@@ -188,7 +215,9 @@ impl<'a, T: SimdReal> Noise<'a, T> {
         let windows = 0..=widest;
         let weights: Vec<[f64; 2]> = windows.map(|l| self.statistics.weights(l, x, y)).collect();
         let nothing = [0, 1].map(|k| VANISHED_NOISE_SHARE * (1.0 - weights.iter().map(|w| w[k]).sum::<f64>()).max(0.0));
-        let mut remaining = RemainingNoise { density: inverse.map(|entry| entry * scale), flow: 0.0, slopes: [0.0; 2] };
+        let own = inverse.map(|entry| entry * scale);
+        let density = coarse.filter(|coarse| coarse[0] + coarse[2] < own[0] + own[2]).unwrap_or(own);
+        let mut remaining = RemainingNoise { densities: [density, own], flow: 0.0, slopes: [0.0; 2] };
         for (l, sigma) in self.statistics.sigmas.iter().enumerate() {
             let weight = [0, 1].map(|k| weights[l][k] + if l == widest { nothing[k] } else { 0.0 });
             if weight == [0.0; 2] {

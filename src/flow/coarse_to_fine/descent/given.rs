@@ -40,8 +40,8 @@ impl DescentPlan {
         let comparison = Comparison { simd, level, compared: all, residual_std, follows_majority, pool, space };
         let is_used = comparison.replace_where_better(&mut own.motion, &refined.motion, MIN_MOTION_DIFFERENCE);
         if is_used {
-            for (k, planes) in (first + 1..).zip(&mut own.coarser_motions) {
-                space.keep(std::mem::replace(planes, coarsened(workspace, &own.motion, first..=k)));
+            for (k, level) in (first + 1..).zip(&mut own.coarser) {
+                space.keep(std::mem::replace(&mut level.motion, coarsened(workspace, &own.motion, first..=k)));
             }
         }
         refined.recycle(space);

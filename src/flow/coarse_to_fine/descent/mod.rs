@@ -40,7 +40,7 @@ pub(super) struct DescentPlan {
     pub schedule: Schedule,
     pub brightness: BrightnessScale,
     pub finest: usize,
-    /// Whether the motion on coarser levels is kept, for the covariance.
+    /// Whether coarser levels are kept, for the covariance.
     pub keeps_levels: bool,
 }
 
@@ -51,14 +51,33 @@ pub(super) struct DescentResult<T> {
     pub data: Planes<T>,
     /// Standard deviation of the residual, grey levels.
     pub residual_std: Option<T>,
-    /// The regularised motion on each coarser level, the finest first, if kept.
-    pub coarser_motions: Vec<Planes<T>>,
+    /// The coarser levels, the finest first, if kept.
+    pub coarser: Vec<CoarserLevel<T>>,
+}
+
+/// What the covariance needs of a coarser level.
+#[derive(Debug)]
+pub(super) struct CoarserLevel<T> {
+    /// The regularised motion.
+    pub motion: Planes<T>,
+    /// Summary of the last data term.
+    pub data: Planes<T>,
+}
+
+impl<T: SimdReal> CoarserLevel<T> {
+    /// Returns all planes.
+    pub fn recycle(self, space: &PlanePool<T>) {
+        space.keep(self.motion);
+        space.keep(self.data);
+    }
 }
 
 impl<T: SimdReal> DescentResult<T> {
     /// Returns all planes.
     pub fn recycle(self, space: &PlanePool<T>) {
-        self.coarser_motions.into_iter().chain([self.motion, self.data]).for_each(|planes| space.keep(planes));
+        self.coarser.into_iter().for_each(|level| level.recycle(space));
+        space.keep(self.motion);
+        space.keep(self.data);
     }
 }
 
@@ -99,10 +118,15 @@ impl DescentPlan {
             refines: false,
             ..schedules[from]
         };
-        let DescentResult { motion, data, residual_std, coarser_motions } = coarse;
-        workspace.space.keep(data);
+        let DescentResult { motion, data, residual_std, coarser } = coarse;
         let mut fine = self.descend(workspace, ComparedFrames::All, (motion, residual_std), (&schedules, self.finest));
-        fine.coarser_motions.extend(coarser_motions);
+        // Without iterations there, the level the descent began on has the data of the coarse result.
+        let data = match fine.coarser.last_mut() {
+            Some(level) if iterations == 0 => std::mem::replace(&mut level.data, data),
+            _ => data,
+        };
+        workspace.space.keep(data);
+        fine.coarser.extend(coarser);
         fine
     }
 
@@ -154,17 +178,17 @@ impl DescentPlan {
         let coarsest = levels.len() - 1;
         let schedules = self.schedules(levels);
         let start = coarsened(workspace, motion, level..=coarsest);
-        let DescentResult { motion: coarser_motions, data, residual_std, .. } =
+        let DescentResult { motion: coarser, data, residual_std, .. } =
             self.without_levels().descend(workspace, ComparedFrames::Ahead, (start, None), (&schedules, level + 1));
         let Workspace { pyramid, pool, space, .. } = workspace;
         let level = &pyramid.levels()[level];
         let (width, height) = site_counts(level.size);
         let mut own = space.planes(width, height, MOTION);
-        finer(self.simd, &coarser_motions, level.size, &mut own);
+        finer(self.simd, &coarser, level.size, &mut own);
         let (simd, compared, follows_majority) = (self.simd, ComparedFrames::Ahead, false);
         let comparison = Comparison { simd, level, compared, residual_std, follows_majority, pool, space };
         comparison.replace_where_better(motion, &own, 0.0);
-        for planes in [coarser_motions, data, own] {
+        for planes in [coarser, data, own] {
             space.keep(planes);
         }
     }
@@ -187,7 +211,7 @@ impl DescentPlan {
         let [mut motion, mut old] = [0, 1].map(|_| space.planes(width, height, MOTION));
         motion.copy_from(&start);
         space.keep(start);
-        let mut coarser_motions = Vec::new();
+        let mut coarser = Vec::new();
         for (k, (level, schedule)) in pyramid.levels().iter().zip(schedules).enumerate().skip(to).rev() {
             if k + 1 < schedules.len() {
                 std::mem::swap(&mut motion, &mut old);
@@ -219,14 +243,14 @@ impl DescentPlan {
                     .correct(self.simd, &mut motion);
             }
             if self.keeps_levels && k > to {
-                coarser_motions.insert(0, copy(space, &motion));
+                coarser.insert(0, CoarserLevel { motion: copy(space, &motion), data: summary(space, step.data) });
             }
         }
         space.keep(old);
         let residual_std = step.residual_std;
         let summary = summary(space, &data);
         space.keep(data);
-        DescentResult { motion, data: summary, residual_std, coarser_motions }
+        DescentResult { motion, data: summary, residual_std, coarser }
     }
 }
 
