@@ -64,6 +64,7 @@ pub const HEURISTICS: &[(&str, &str)] = &[
     ("stereo.trusted_velocity", "the velocity follows measurements by their support"),
     ("stereo.larger_parts", "a mostly covered track passes to a larger part"),
     ("stereo.covered_position", "the position of a mostly covered track is extrapolated"),
+    ("stereo.covered_extent", "what reappears of a partly covered object extends its component"),
     ("stereo.covered_tolerance", "a partly covered object may be farther off"),
     ("stereo.assumed_motion", "overlaps of what was not measured by the last motion or none"),
     ("stereo.widened", "carried components are widened by half a voxel"),

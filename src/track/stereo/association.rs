@@ -2,6 +2,7 @@
 //! track is kept for a while and recognised by its position.
 
 use super::clock::Clock;
+use super::warm_start::WholeObject;
 
 /// Recognition of lost tracks (`improved`).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -187,7 +188,7 @@ impl TrackAssociation {
     fn pass_to_larger_parts(&mut self, at: Clock, seen: &[Sighting], least: f64, limits: &Recognition) {
         for own in seen {
             let Some(track) = self.live[own.component].as_ref() else { continue };
-            if own.pixels as f64 >= COVERED_SHARE * track.peak {
+            if !track.is_covered(own.pixels as f64) {
                 continue;
             }
             let begun = |other: &ComponentTrack| at.now <= other.born + limits.coast as f64 + TIME_TOLERANCE;
@@ -197,7 +198,7 @@ impl TrackAssociation {
                 self.live[new.component].as_ref().is_none_or(gives_way)
                     && new.pixels > own.pixels
                     && new.pixels as f64 >= least
-                    && track.distance(at.gap, new, limits).is_some()
+                    && track.fits(at.gap, (new.position, new.pixels as f64), limits)
             });
             if let Some(new) = larger.max_by_key(|new| (new.pixels, std::cmp::Reverse(new.component))) {
                 self.live.swap(own.component, new.component);
@@ -205,8 +206,24 @@ impl TrackAssociation {
         }
     }
 
-    /// Gives components of at least `least` pixels without a track a matching lost one (largest first, then
-    /// nearest) or a new one. Updates all positions.
+    /// The largest partly covered object, as it was when visible, that edge pixels `gap` ordinary steps after
+    /// its last ones may be a part of. `shown`: pixels of a component at the last step.
+    pub fn reappeared(
+        &self,
+        gap: f64,
+        seen: ([f64; 3], f64),
+        shown: impl Fn(usize) -> usize,
+    ) -> Option<(usize, WholeObject)> {
+        let fits = |(k, track): (usize, &Option<ComponentTrack>)| {
+            let track = track.as_ref().filter(|track| track.is_covered(shown(k) as f64))?;
+            track.fits(gap, seen, &Recognition::default()).then(|| (k, track.whole(gap)))
+        };
+        let covered = self.live.iter().enumerate().filter_map(fits);
+        covered.max_by(|(_, a), (_, b)| a.pixels.total_cmp(&b.pixels))
+    }
+
+    /// Gives components of at least `least` pixels without a track a matching lost one (largest components
+    /// first, the largest track of each) or a new one. Updates all positions.
     pub fn associate(&mut self, at: Clock, seen: &[Sighting], least: f64, limits: Option<&Recognition>) {
         self.lost.retain(|track| {
             limits.is_some_and(|limits| at.now - track.since <= limits.patience as f64 + TIME_TOLERANCE)
@@ -216,12 +233,12 @@ impl TrackAssociation {
             for (r, track) in self.lost.iter().enumerate() {
                 let unnamed = |new: &&Sighting| new.pixels as f64 >= least && self.live[new.component].is_none();
                 for new in seen.iter().filter(unnamed) {
-                    if let Some(distance) = track.track.distance(at.now - track.since, new, limits) {
-                        pairs.push((new.pixels, distance, r, new.component));
+                    if track.track.fits(at.now - track.since, (new.position, new.pixels as f64), limits) {
+                        pairs.push((new.pixels, track.track.peak, r, new.component));
                     }
                 }
             }
-            pairs.sort_by(|a, b| b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
+            pairs.sort_by(|a, b| b.0.cmp(&a.0).then(b.1.total_cmp(&a.1)).then((a.2, a.3).cmp(&(b.2, b.3))));
             let mut taken = vec![false; self.lost.len()];
             let mut named = vec![false; self.live.len()];
             for (_, _, r, k) in pairs {
@@ -256,9 +273,7 @@ impl ComponentTrack {
     fn see(&mut self, (position, pixels, spread): ([f64; 3], f64, [f64; 2]), gap: f64) {
         self.peak = pixels.max(PEAK_DECAY.powf(gap) * self.peak);
         self.position = match self.velocity {
-            Some(velocity)
-                if crate::ablation::keeps("stereo.covered_position") && pixels < COVERED_SHARE * self.peak =>
-            {
+            Some(velocity) if crate::ablation::keeps("stereo.covered_position") && self.is_covered(pixels) => {
                 std::array::from_fn(|i| self.position[i] + gap * velocity[i])
             }
             _ => {
@@ -268,13 +283,27 @@ impl ComponentTrack {
         };
     }
 
-    /// Distance of a component from the predicted position, in tolerances; `None` beyond them.
-    fn distance(&self, steps: f64, seen: &Sighting, limits: &Recognition) -> Option<f64> {
-        let velocity = self.velocity?;
+    /// Whether it is partly covered where it shows this many edge pixels.
+    fn is_covered(&self, pixels: f64) -> bool {
+        pixels < COVERED_SHARE * self.peak
+    }
+
+    /// As it was when visible, `gap` ordinary steps after the last one.
+    fn whole(&self, gap: f64) -> WholeObject {
+        let velocity = self.velocity.unwrap_or_default();
+        WholeObject {
+            middle: std::array::from_fn(|i| self.position[i] + gap * velocity[i]),
+            variance: self.spread.map(|spread| (HALF_EXTENT * spread).powi(2) / 3.0),
+            pixels: self.peak,
+        }
+    }
+
+    /// Whether edge pixels at a position, `steps` ordinary steps after the last ones, may be of this object.
+    fn fits(&self, steps: f64, (position, pixels): ([f64; 3], f64), limits: &Recognition) -> bool {
+        let Some(velocity) = self.velocity else { return false };
         // The middle of the visible part differs from that of the whole by up to the covered part.
-        let covered = 1.0 - (seen.pixels as f64 / self.peak.max(1.0)).min(1.0);
-        let mut sum = 0.0;
-        for i in 0..3 {
+        let covered = 1.0 - (pixels / self.peak.max(1.0)).min(1.0);
+        (0..3).all(|i| {
             let expected = self.position[i] + steps * velocity[i];
             let part = if i < 2 && crate::ablation::keeps("stereo.covered_tolerance") {
                 covered * HALF_EXTENT * self.spread[i]
@@ -282,13 +311,8 @@ impl ComponentTrack {
                 0.0
             };
             let tolerance = limits.tolerance[i] + steps * limits.tolerance_per_step[i] + part;
-            let off = (seen.position[i] - expected).abs() / tolerance;
-            if off > 1.0 {
-                return None;
-            }
-            sum += off * off;
-        }
-        Some(sum)
+            (position[i] - expected).abs() <= tolerance
+        })
     }
 
     fn is_outgrown(&self, seen: &Sighting) -> bool {

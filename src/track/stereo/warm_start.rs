@@ -42,6 +42,30 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
     out
 }
 
+/// A partly covered object as it was when visible, at its predicted place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct WholeObject {
+    /// Along x and y, cells.
+    pub middle: [f64; 2],
+    /// Along x and y, cells^2.
+    pub variance: [f64; 2],
+    /// Edge pixels.
+    pub pixels: f64,
+}
+
+impl WholeObject {
+    /// Extends component `k` to the whole object.
+    pub fn extend(&self, posterior: &mut Posterior, k: usize) {
+        let nu = posterior.degrees_of_freedom[k];
+        for i in 0..2 {
+            posterior.means[k * D + i] = self.middle[i];
+            let scatter = &mut posterior.scale_inverses[(k * D + i) * D + i];
+            *scatter = scatter.max(nu * self.variance[i]);
+        }
+        posterior.weight_concentration[k] = posterior.weight_concentration[k].max(self.pixels);
+    }
+}
+
 /// Seeds components with fewer than [`MIN_COMPONENT_PIXELS`] pixels, or spread so thinly that they explain
 /// none, at the largest blobs of unexplained pixels. Returns which were seeded and the unexplained voxels
 /// outside of such blobs; `None` if most pixels are unexplained: a new scene.
@@ -49,9 +73,17 @@ pub(super) fn moved(posterior: &Posterior, motions: &[Option<[f64; D]>]) -> Post
 /// One seed a blob: several would compete for it over the next steps and exchange tracks. Explained pixels do
 /// not count, because a seed beside a flat component could take that over.
 ///
+/// A blob at a place, with its number of pixels, may be what has `reappeared` of a partly covered object.
+/// That object's component is extended then: a seed would compete for the object and take most of it.
+///
 /// # Errors
 /// Those of the mixture.
-pub(super) fn reseed(posterior: &mut Posterior, voxels: &Voxels, points: &Points) -> Result<Option<Seeded>> {
+pub(super) fn reseed(
+    posterior: &mut Posterior,
+    voxels: &Voxels,
+    points: &Points,
+    reappeared: impl Fn([f64; D], f64) -> Option<(usize, WholeObject)>,
+) -> Result<Option<Seeded>> {
     let components = posterior.components();
     let (densities, shares) = posterior.log_densities(points)?;
     let all: f64 = voxels.counts.iter().map(|&count| f64::from(count)).sum();
@@ -67,13 +99,23 @@ pub(super) fn reseed(posterior: &mut Posterior, voxels: &Voxels, points: &Points
         return Ok(None);
     }
     let outliers = outliers.into_iter().flat_map(|blob| blob.members).collect();
+    let mut extended = vec![false; components];
+    if crate::ablation::keeps("stereo.covered_extent") {
+        blobs.retain(|blob| {
+            let Some((k, whole)) = reappeared(blob.middle(), blob.pixels) else { return true };
+            whole.extend(posterior, k);
+            extended[k] = true;
+            false
+        });
+    }
     // Ties keep the order of the voxels.
     blobs.sort_by(|a, b| b.pixels.total_cmp(&a.pixels));
     let mut pixels = vec![0.0; components];
     for (row, &count) in shares.chunks_exact(components).zip(&voxels.counts) {
         pixels.iter_mut().zip(row).for_each(|(sum, share)| *sum += share * f64::from(count));
     }
-    let dead: Vec<usize> = (0..components).filter(|&k| is_left_over(posterior, k, (pixels[k], all))).collect();
+    let dead: Vec<usize> =
+        (0..components).filter(|&k| !extended[k] && is_left_over(posterior, k, (pixels[k], all))).collect();
     let mut seeds = vec![false; components];
     for (k, blob) in dead.into_iter().zip(&blobs).filter(|_| crate::ablation::keeps("stereo.reseed")) {
         blob.place(posterior, k);
@@ -139,6 +181,25 @@ pub(super) mod tests {
     }
 
     #[test]
+    fn what_reappears_extends_its_component_and_seeds_none() {
+        let block = |at: [u16; 3], n: u16| (0..n).map(move |i| ([at[0] + i % 3, at[1] + i / 3 % 3, at[2]], 0));
+        let cells: Vec<_> = block([10, 10, 30], 90).chain(block([17, 12, 30], 45)).collect();
+        let voxels = synthetic_clusters(&cells, 1).voxels;
+        let (values, weights) = (voxels.places(), voxels.weights());
+        let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
+        let mut got = posterior();
+        let whole = WholeObject { middle: [14.0, 12.0], variance: [9.0, 0.1], pixels: 400.0 };
+        let reappeared = |place, pixels| {
+            assert_eq!((place, pixels), ([18.0, 13.0, 30.0], 45.0));
+            Some((0, whole))
+        };
+        assert_eq!(reseed(&mut got, &voxels, &points, reappeared).unwrap().unwrap().seeds, [false, false]);
+        assert_eq!(got.means, [14.0, 12.0, 30.0, 70.0, 50.0, 3.0]);
+        assert_eq!([0, 4, 8].map(|i| got.scale_inverses[i]), [540.0, 50.0, 50.0]);
+        assert_eq!(got.weight_concentration, [400.0, 60.0]);
+    }
+
+    #[test]
     fn who_has_no_pixels_goes_where_the_others_explain_least() {
         let block = |at: [u16; 3], n: u16| (0..n).map(move |i| ([at[0] + i % 3, at[1] + i / 3 % 3, at[2]], 0));
         // A block that the first component explains, one that none does, and a single outlier.
@@ -148,12 +209,12 @@ pub(super) mod tests {
         let (values, weights) = (voxels.places(), voxels.weights());
         let points = Points { dimensions: 3, values: &values, weights: Some(&weights) };
         let mut posterior = posterior();
-        assert_eq!(reseed(&mut posterior, &voxels, &points).unwrap().unwrap().seeds, [false, true]);
+        assert_eq!(reseed(&mut posterior, &voxels, &points, |_, _| None).unwrap().unwrap().seeds, [false, true]);
         let mean = &posterior.means[3..];
         assert_eq!(mean, [41.0, 21.0, 20.0]);
         // Its extent: cells 40 to 42 and 20 to 22, each counted five times, one layer.
         let scatter = |i: usize| posterior.scale_inverses[9 + 4 * i] - COVARIANCE_PRIOR - 45.0 / 12.0;
         assert!((scatter(0) - 30.0).abs() < 1e-9 && (scatter(1) - 30.0).abs() < 1e-9 && scatter(2).abs() < 1e-9);
-        assert_eq!(reseed(&mut posterior, &voxels, &points).unwrap().unwrap().seeds, [false, false]);
+        assert_eq!(reseed(&mut posterior, &voxels, &points, |_, _| None).unwrap().unwrap().seeds, [false, false]);
     }
 }

@@ -90,7 +90,11 @@ impl StereoTracker {
             None => vec![],
         };
         let start = self.posterior.as_ref().map(|posterior| moved(posterior, &carried));
-        let (clustered, seeded) = self.cluster_carried(points, voxels, start)?;
+        let reappeared = |place, pixels| {
+            let shown = |k: usize| last.as_ref().map_or(0, |last| last.clusters.pixels[k].len());
+            self.association.reappeared(self.clock.gap, (place, pixels), shown)
+        };
+        let (clustered, seeded) = self.cluster_carried(points, voxels, start, reappeared)?;
         let (clustered, seeded, (forward, backward)) = match &last {
             Some(last) => self.succeeding(&last.clusters, clustered, seeded, &motions),
             None => (clustered, seeded, (vec![], vec![])),

@@ -2,7 +2,7 @@
 
 use super::super::clusters::Clusters;
 use super::super::voxels::{EdgePoints, Voxels};
-use super::super::warm_start::{Seeded, reseed, split_and_merge};
+use super::super::warm_start::{Seeded, WholeObject, reseed, split_and_merge};
 use super::StereoTracker;
 use crate::error::Result;
 use crate::mixture::{Fit, Points, Posterior, Start, fit};
@@ -33,12 +33,14 @@ impl Clustered {
 }
 
 impl StereoTracker {
-    /// Clusters voxels from carried components. Returns which components were seeded.
+    /// Clusters voxels from carried components; `reappeared`: that of [`reseed`]. Returns which components
+    /// were seeded.
     pub(super) fn cluster_carried(
         &self,
         points: EdgePoints,
         voxels: Voxels,
         start: Option<Posterior>,
+        reappeared: impl Fn([f64; 3], f64) -> Option<(usize, WholeObject)>,
     ) -> Result<(Clustered, Vec<bool>)> {
         if voxels.is_empty() {
             return Ok((Clustered::nothing(points, voxels), vec![]));
@@ -55,7 +57,7 @@ impl StereoTracker {
             fit(&Points { weights: Some(&kept), ..weighted }, &carried, Start::Components(start))
         };
         if let Some(mut start) = start
-            && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted)?
+            && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted, reappeared)?
         {
             let fitted = without(&start, &outliers)?;
             return Ok((Clustered::new(points, voxels, fitted, &weighted)?, seeds));
@@ -67,7 +69,7 @@ impl StereoTracker {
         for seeding in [true, false] {
             let mut start = fitted.posterior.clone();
             let mut changed = split_and_merge(&mut start, &voxels, &weighted)?;
-            if seeding && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted)? {
+            if seeding && let Some(Seeded { seeds, outliers }) = reseed(&mut start, &voxels, &weighted, |_, _| None)? {
                 changed |= seeds.contains(&true);
                 left_out = outliers;
             }

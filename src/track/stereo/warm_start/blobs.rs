@@ -76,6 +76,11 @@ impl Blob {
         (0..D * D).for_each(|i| self.squares[i] += other.squares[i]);
     }
 
+    /// Mean place, cells.
+    pub fn middle(&self) -> [f64; D] {
+        self.sums.map(|sum| sum / self.pixels)
+    }
+
     /// Covariance, cells^2, with the quantisation variance of a cell, 1/12.
     pub fn covariance(&self) -> Matrix3<f64> {
         Matrix3::from_fn(|i, j| {
@@ -99,7 +104,7 @@ impl Blob {
         let scatter = if self.pixels > 0.0 { self.pixels * self.covariance() } else { Matrix3::zeros() };
         for i in 0..D {
             if self.pixels > 0.0 {
-                posterior.means[k * D + i] = self.sums[i] / self.pixels;
+                posterior.means[k * D + i] = self.middle()[i];
             }
             for j in 0..D {
                 let prior = if i == j { COVARIANCE_PRIOR } else { 0.0 };
