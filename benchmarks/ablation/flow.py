@@ -3,8 +3,8 @@ motions, beside a motion boundary (of three frames too), beside a mask's edge an
 errors, px; share of errors above 1 px that neither status nor standard deviation states; share of the sites
 of independent noise that are valid; change by saturated pixels, standard deviations; bias of pairs in noise,
 px; errors in waves and in narrow frames, px; share of errors outside 95 % intervals, of undersampled texture
-and of discs that smoothness holds back, whose own errors are relative to their motion; standard deviation of
-faint texture, px; time on equal frames."""
+and of discs that smoothness holds back, whose own errors are relative to their motion; standard deviations of
+faint texture and of a plain strip, px; time on equal frames."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NARROW, NARROW_SHIFT = 6, (1.3, -0.6)
 BESIDE, MASKED_SHIFT = 12, (2.6, -1.3)
 """Width of what is compared beside a mask's edge, and the motion there, px."""
 FAINT_SHIFT = (1.3, -0.7)
-"""Motion of faint texture, px; errors are a tenth of a pixel."""
+"""Motion of faint texture and of a plain strip, px; errors are .1 and .4 px."""
 RADIUS, ANGLES = 20.0, (0.02, 0.04)
 """Of discs, px, and their turns, rad."""
 SHIFTS = ((56, 0), (0, -64), (80, 60))
@@ -42,7 +42,7 @@ def rows() -> dict[str, list[float]]:
     """One value for each change and seed, each seed, each shift and seed."""
     names = (
         "equal", "changed", "specks", "shifts", "boundary", "three frames", "silent", "unrelated", "undersampled", "noise",
-        "waves", "narrow", "mask", "outside", "discs", "disc errors", "faint", "ms",
+        "waves", "narrow", "mask", "outside", "discs", "disc errors", "faint", "plain", "ms",
     )
     found: dict[str, list[float]] = {name: [] for name in names}
     for seed in SEEDS:
@@ -92,6 +92,8 @@ def rows() -> dict[str, list[float]]:
         field = jacoflow.flow(*strip, covariance=False, threads=1).flow - np.array(NARROW_SHIFT)
         found["narrow"].append(float(np.sqrt(np.mean(np.sum(field[:, 8:-8] ** 2, axis=-1)))))
         found["mask"].append(beside_mask(seed))
+        plain = jacoflow.flow(*scenes.plain(seed, FAINT_SHIFT), threads=1).std("u")
+        found["plain"].append(float(np.median(plain[scenes.PLAIN, scenes.MARGIN : 110])))
         faint = jacoflow.flow(*scenes.faint(seed, FAINT_SHIFT), threads=1).std("u")
         found["faint"].append(float(np.median(faint[scenes.FAINT : -scenes.MARGIN, scenes.MARGIN : -scenes.MARGIN])))
     for shift, seed in itertools.product(SHIFTS, SEEDS):

@@ -18,6 +18,8 @@ LARGE = (480, 640)
 """Height and width of the frames with saturated pixels."""
 FAINT = 110
 """First row of the faint texture that is compared, px."""
+PLAIN = slice(90, 110)
+"""Rows of the plain strip that are compared, px; those of columns up to 110."""
 _X = np.linspace(0, 1, SIZE[1])
 CHANGES: dict[str, Callable[[Array], Array]] = {
     "gain .5": lambda frame: 0.5 * frame,
@@ -148,6 +150,20 @@ def faint(seed: int, shift: tuple[float, float]) -> list[Array]:
     is_strong = np.indices(SIZE)[0] < FAINT - MARGIN
     frames = [np.where(is_strong, 40 * view(picture, (5.0 * k, 0.0)), view(weak, (k * shift[0], k * shift[1]))) for k in (0, 1)]
     return [noisy(120 + frame, 10 * seed + k) for k, frame in enumerate(frames)]
+
+
+def plain(seed: int, shift: tuple[float, float]) -> list[Array]:
+    """Two frames of texture with a plain strip that moves as a whole, and beside it patches that move against
+    each other."""
+    y, x = np.indices(SIZE)
+    pictures = texture(seed), texture(seed + 100)
+    goes_right, is_strip = (y // 25 + x // 25) % 2 == 0, abs(y - PLAIN.start - 10) < 15
+    frames = []
+    for k in (0, 1):
+        whole = view(pictures[0], (k * shift[0], k * shift[1]))
+        patches = np.where(goes_right, view(pictures[1], (4.0 * k, 0.0)), view(pictures[1], (-4.0 * k, 0.0)))
+        frames.append(np.where(x < 150, np.where(is_strip, 0.0, whole), patches))
+    return [noisy(120 + 30 * frame, 10 * seed + k) for k, frame in enumerate(frames)]
 
 
 def waves(seed: int, size: int = 160, wavelength: float = 40.0) -> tuple[list[Array], Array]:
